@@ -1,0 +1,163 @@
+"""Imports run one way: the whole list of what may import what, and nothing else may."""
+
+import ast
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+PACKAGES = {"planarm": ROOT / "host", "planarm_wire": ROOT / "protocol", "planarm_sim": ROOT / "hil_sim"}
+
+# Room -> rooms it may import. A room is the first folder or file below a package; planarm_wire is one room,
+# except its kernel cache, the one thing beside the wire that host and emulator share.
+WIRE = {"planarm_wire", "planarm_wire.kernel_cache"}
+ALLOWED: dict[str, set[str]] = {
+    "planarm_wire": {"planarm_wire"},
+    "planarm_wire.kernel_cache": set(),
+    "planarm": set(),
+    "planarm.errors": set(),
+    "planarm.scene": {"planarm.errors"},
+    "planarm.model": {"planarm.errors", "planarm.scene", "planarm_wire.kernel_cache"},
+    "planarm.workspace": {"planarm.errors", "planarm.scene", "planarm.model", "planarm_wire.kernel_cache"},
+    "planarm.search": {
+        "planarm.errors",
+        "planarm.scene",
+        "planarm.model",
+        "planarm.workspace",
+        "planarm_wire.kernel_cache",
+    },
+    "planarm.smoothing": {
+        "planarm.errors",
+        "planarm.scene",
+        "planarm.model",
+        "planarm.workspace",
+        "planarm.search",
+        "planarm_wire.kernel_cache",
+    },
+    "planarm.trajectory": {
+        "planarm.errors",
+        "planarm.scene",
+        "planarm.model",
+        "planarm.smoothing",
+        "planarm_wire.kernel_cache",
+    },
+    "planarm.stepping": {
+        "planarm.errors",
+        "planarm.scene",
+        "planarm.model",
+        "planarm.workspace",
+        "planarm.smoothing",
+        "planarm.trajectory",
+        *WIRE,
+    },
+    "planarm.link": {"planarm.errors", "planarm.scene", "planarm_wire", "planarm_sim"},
+    "planarm.analysis": {"planarm.errors", "planarm_wire"},
+    "planarm.report": {"planarm.errors", "planarm_wire"},
+    "planarm.pipeline": {
+        "planarm",
+        "planarm.errors",
+        "planarm.scene",
+        "planarm.model",
+        "planarm.workspace",
+        "planarm.search",
+        "planarm.smoothing",
+        "planarm.trajectory",
+        "planarm.stepping",
+        "planarm.link",
+        "planarm.analysis",
+        "planarm.report",
+        "planarm.plan_file",
+        "planarm_wire",
+    },
+    "planarm.plan_file": {
+        "planarm",
+        "planarm.errors",
+        "planarm.scene",
+        "planarm.stepping",
+        "planarm_wire",
+    },
+    "planarm.cli": {
+        "planarm",
+        "planarm.errors",
+        "planarm.scene",
+        "planarm.link",
+        "planarm.report",
+        "planarm.pipeline",
+        "planarm.plan_file",
+        *WIRE,
+    },
+    "planarm_sim": {"planarm_sim", "planarm_wire", "planarm_wire.kernel_cache"},
+}
+# The emulator enters the host through these files alone, and only inside functions.
+SIM_DOORS = {"host/planarm/link/sim_transport.py", "host/planarm/cli/emulate.py"}
+
+
+def room_of(module: str) -> str:
+    parts = module.split(".")
+    if parts[0] == "planarm" and len(parts) > 1:
+        return ".".join(parts[:2])
+    if module.startswith("planarm_wire.kernel_cache"):
+        return "planarm_wire.kernel_cache"
+    return parts[0]
+
+
+def module_of(path: Path) -> str:
+    relative = path.relative_to(PACKAGES[next(p for p in PACKAGES if (PACKAGES[p] / p) in path.parents)])
+    return ".".join(relative.with_suffix("").parts).removesuffix(".__init__")
+
+
+def imported_modules(node: ast.AST, module: str, is_package: bool) -> list[str]:
+    """Every one of our modules that the import statement names, relative ones resolved."""
+    if isinstance(node, ast.Import):
+        return [alias.name for alias in node.names if alias.name.split(".")[0] in PACKAGES]
+    if not isinstance(node, ast.ImportFrom):
+        return []
+    base = node.module or ""
+    if node.level:
+        parents = module.split(".") if is_package else module.split(".")[:-1]
+        base = ".".join([*parents[: len(parents) - node.level + 1], *([base] if base else [])])
+    if base.split(".")[0] not in PACKAGES:
+        return []
+    return [f"{base}.{alias.name}" if base in ("planarm", "planarm_wire") else base for alias in node.names]
+
+
+def sources() -> list[Path]:
+    return sorted(path for package, top in PACKAGES.items() for path in (top / package).rglob("*.py"))
+
+
+@pytest.mark.parametrize("path", sources(), ids=lambda p: str(p.relative_to(ROOT)))
+def test_only_listed_imports(path: Path) -> None:
+    module = module_of(path)
+    room = room_of(module)
+    for node in ast.walk(ast.parse(path.read_text())):
+        for target in imported_modules(node, module, path.name == "__init__.py"):
+            other = room_of(target)
+            if other == "planarm" and target.count("."):
+                other = target  # an unknown room shows by its full name
+            if other != room:
+                assert room in ALLOWED, (
+                    f"{room} is a new room: docs/decisions explains it, then this list takes it"
+                )
+                assert other in ALLOWED[room], f"{path.name}:{node.lineno} imports {target}"
+
+
+@pytest.mark.parametrize("path", sources(), ids=lambda p: str(p.relative_to(ROOT)))
+def test_the_emulator_enters_the_host_by_its_doors_and_lazily(path: Path) -> None:
+    if (ROOT / "host") not in path.parents:
+        return
+    module = module_of(path)
+    tree = ast.parse(path.read_text())
+    top_level = {id(node) for node in tree.body}
+    for node in ast.walk(tree):
+        if any(t.split(".")[0] == "planarm_sim" for t in imported_modules(node, module, False)):
+            assert str(path.relative_to(ROOT)) in SIM_DOORS, (
+                f"{path.name}:{node.lineno} is no door to the emulator"
+            )
+            assert id(node) not in top_level, (
+                f"{path.name}:{node.lineno} must import the emulator inside a function"
+            )
+
+
+def test_the_list_names_only_rooms_that_exist() -> None:
+    rooms = {room_of(module_of(path)) for path in sources()}
+    assert set(ALLOWED) <= rooms
