@@ -135,9 +135,7 @@ def test_only_listed_imports(path: Path) -> None:
             if other == "planarm" and target.count("."):
                 other = target  # an unknown room shows by its full name
             if other != room:
-                assert room in ALLOWED, (
-                    f"{room} is a new room: docs/decisions explains it, then this list takes it"
-                )
+                assert room in ALLOWED, f"{room} is a new room: docs/decisions explains it, then this list takes it"
                 assert other in ALLOWED[room], f"{path.name}:{node.lineno} imports {target}"
 
 
@@ -150,12 +148,8 @@ def test_the_emulator_enters_the_host_by_its_doors_and_lazily(path: Path) -> Non
     top_level = {id(node) for node in tree.body}
     for node in ast.walk(tree):
         if any(t.split(".")[0] == "planarm_sim" for t in imported_modules(node, module, False)):
-            assert str(path.relative_to(ROOT)) in SIM_DOORS, (
-                f"{path.name}:{node.lineno} is no door to the emulator"
-            )
-            assert id(node) not in top_level, (
-                f"{path.name}:{node.lineno} must import the emulator inside a function"
-            )
+            assert str(path.relative_to(ROOT)) in SIM_DOORS, f"{path.name}:{node.lineno} is no door to the emulator"
+            assert id(node) not in top_level, f"{path.name}:{node.lineno} must import the emulator inside a function"
 
 
 def test_the_list_names_only_rooms_that_exist() -> None:

@@ -24,9 +24,7 @@ def step_trains(draw):
     """Rises at least 800 ticks apart, each with a direction."""
     gaps = draw(st.lists(st.integers(800, 60_000), min_size=1, max_size=40))
     rises = np.cumsum(gaps).astype(np.int64)
-    directions = np.array(
-        draw(st.lists(st.sampled_from([-1, 1]), min_size=len(gaps), max_size=len(gaps))), np.int8
-    )
+    directions = np.array(draw(st.lists(st.sampled_from([-1, 1]), min_size=len(gaps), max_size=len(gaps))), np.int8)
     return rises, directions
 
 

@@ -84,11 +84,7 @@ def measure_steps(step: Waveform, direction: Waveform) -> MeasuredSteps:
     falls = step.ticks[step.levels == 0]
     # Index of the DIR edge that last happened at or before each rise; -1 means none yet, so low.
     before = np.searchsorted(direction.ticks, rises, side="right") - 1
-    level = (
-        np.where(before >= 0, direction.levels[np.maximum(before, 0)], 0)
-        if len(direction.ticks)
-        else 0 * rises
-    )
+    level = np.where(before >= 0, direction.levels[np.maximum(before, 0)], 0) if len(direction.ticks) else 0 * rises
     directions = np.where(level == 1, 1, -1).astype(np.int8)
     return MeasuredSteps(
         ticks=rises,
@@ -100,9 +96,7 @@ def measure_steps(step: Waveform, direction: Waveform) -> MeasuredSteps:
     )
 
 
-def compare_steps(
-    planned: Sequence[tuple[Ticks, Directions]], measured: Sequence[MeasuredSteps]
-) -> StepComparison:
+def compare_steps(planned: Sequence[tuple[Ticks, Directions]], measured: Sequence[MeasuredSteps]) -> StepComparison:
     """Hold the measured steps against the schedule.
 
     Args:
@@ -118,8 +112,7 @@ def compare_steps(
     if counts_planned != counts_measured:
         return StepComparison(counts_planned, counts_measured, False, None)
     agree = all(
-        np.array_equal(directions, joint.directions)
-        for (_, directions), joint in zip(planned, measured, strict=True)
+        np.array_equal(directions, joint.directions) for (_, directions), joint in zip(planned, measured, strict=True)
     )
     moving = [(ticks, joint.ticks) for (ticks, _), joint in zip(planned, measured, strict=True) if len(ticks)]
     if not moving:
