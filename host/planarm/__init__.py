@@ -1,0 +1,1 @@
+"""planarm: a planar robot arm from a scene file to proven step pulses."""

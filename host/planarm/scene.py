@@ -1,0 +1,120 @@
+"""Scenes: a TOML file read strictly into frozen dataclasses.
+
+This is the only place where units are converted: the file speaks centimetres and degrees, everything behind it
+centimetres and radians. docs/scene.md is the reference of the format.
+"""
+
+from dataclasses import dataclass
+from math import pi
+from typing import Literal
+
+Elbow = Literal["up", "down", "either"]
+Shape = Literal["circle", "square", "diamond", "triangle", "hexagon", "polygon"]
+Algorithm = Literal["a_star", "modified_a_star", "chaos_a_star", "chs"]
+Subset = Literal["run", "expansion"]
+Moves = Literal["proved", "nodes"]
+
+Point = tuple[float, float]
+Range = tuple[float, float]
+
+
+@dataclass(frozen=True, slots=True)
+class ArmSpec:
+    """The arm: links from the base outwards; elbow "up" means theta2 < 0, "down" theta2 > 0."""
+
+    link_lengths_cm: tuple[float, ...]
+    link_width_cm: float
+    base_cm: Point
+    elbow: Elbow
+    joint_limits_rad: tuple[Range, ...]
+    floor: bool
+    """True when all links must stay above y = 0."""
+
+
+@dataclass(frozen=True, slots=True)
+class WorkspaceSpec:
+    """The rectangle that is searched and the grid laid over it."""
+
+    x_cm: Range
+    y_cm: Range
+    cell_cm: float
+    clearance_cm: float
+    """Room to keep between the links' edges and the obstacles."""
+
+
+@dataclass(frozen=True, slots=True)
+class Obstacle:
+    """A filled shape: centre and diameter of the circumscribed circle, or the vertices of a polygon."""
+
+    shape: Shape
+    center_cm: Point | None = None
+    diameter_cm: float | None = None
+    vertices_cm: tuple[Point, ...] | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class TaskSpec:
+    """Where the end effector starts and where it is to go."""
+
+    start_cm: Point
+    goal_cm: Point
+
+
+@dataclass(frozen=True, slots=True)
+class PlannerSpec:
+    """The search: algorithm, neighbourhood, and how moves are checked.
+
+    `subset` says how often Chaos A* draws its subset of the neighbours; `moves` "proved" proves every move free,
+    "nodes" checks grid nodes only, as the papers do.
+    """
+
+    algorithm: Algorithm
+    neighbours: int
+    subset: Subset
+    seed: int
+    moves: Moves
+
+
+@dataclass(frozen=True, slots=True)
+class JointSpec:
+    """A joint's stepper motor, gear and limits."""
+
+    steps_per_rev: int
+    microsteps: int
+    gear_ratio: float
+    driver: str
+    max_speed_rad_s: float
+    max_acceleration_rad_s2: float
+
+    @property
+    def usteps_per_rad(self) -> float:
+        """Micro-steps of the motor for one radian of the joint."""
+        return self.steps_per_rev * self.microsteps * self.gear_ratio / (2.0 * pi)
+
+
+@dataclass(frozen=True, slots=True)
+class LinkSpec:
+    """Where the firmware is reached: port or URL, and the baud rate."""
+
+    port: str
+    baud: int
+
+
+@dataclass(frozen=True, slots=True)
+class Scene:
+    """Everything a scene file says, in centimetres and radians."""
+
+    name: str
+    source: str
+    arm: ArmSpec
+    workspace: WorkspaceSpec
+    obstacles: tuple[Obstacle, ...]
+    task: TaskSpec
+    planner: PlannerSpec
+    joints: tuple[JointSpec, ...]
+    link: LinkSpec
+
+    @property
+    def margin_cm(self) -> float:
+        """Least distance of a link's centre line to an obstacle: half the link's width plus the clearance."""
+        return 0.5 * self.arm.link_width_cm + self.workspace.clearance_cm
