@@ -1,0 +1,237 @@
+"""Kernels compiled by Numba, cached on disk so that an edit never serves stale code.
+
+Numba's own cache looks only at the file that holds a function. It misses an edit in a function called
+from another file, an edit of a constant imported from another file (globals are frozen into the compiled
+code), and it wants to write beside the sources, which a read-only install does not allow. Here the cache
+of each package lives in a folder per user whose name is a hash of everything that can end up in the
+package's compiled code:
+
+- every source file of the package that mentions `kernel_cache`, and all files of the package or of
+  `planarm_wire` that those import, directly or not;
+- the versions of Python and Numba, and the NUMBA_ settings of the environment (bounds checks, for one,
+  change the code).
+
+Folder: `PLANARM_CACHE_DIR` when set, else the user's cache folder (`XDG_CACHE_HOME` or `~/.cache`, on
+macOS `~/Library/Caches`, on Windows `%LOCALAPPDATA%`), else, when that cannot be written, a folder of the
+user's own below the system's temporary folder. The latest 16 builds of a package are kept.
+
+Why it lives in `planarm_wire`: host and emulator both compile kernels, neither may import the other, and
+the wire is the one package below both. Numba is imported here only, when the first kernel is decorated.
+"""
+
+from __future__ import annotations
+
+import functools
+import hashlib
+import importlib.util
+import os
+import re
+import shutil
+import stat
+import sys
+import tempfile
+import threading
+from collections.abc import Callable, Iterator
+from importlib import metadata
+from pathlib import Path
+from typing import Any, TypeVar, cast
+
+F = TypeVar("F", bound=Callable[..., Any])
+
+CACHE_DIR_VARIABLE = "PLANARM_CACHE_DIR"
+KEPT_BUILDS = 16
+
+_MARK = b"kernel_cache"
+_KEY_NAME = re.compile(r"[0-9a-f]{16}")
+# An import at the left margin: the module, then what it takes from it (one line, or a bracket over several).
+_IMPORT = re.compile(rb"^(?:from[ \t]+([\w.]+)[ \t]+import[ \t]+(\([^)]*\)|[^\n]*)|import[ \t]+([^\n]*))", re.M)
+_NAME = re.compile(rb"[\w.]+")
+_config_lock = threading.Lock()
+
+
+def kernel(function: F) -> F:
+    """Compile `function` with `numba.njit` on its first call, cached on disk as this module describes.
+
+    With NUMBA_DISABLE_JIT=1 the plain Python function is returned. Raises OSError when `PLANARM_CACHE_DIR`
+    is set to a folder that cannot be written.
+    """
+    import numba  # noqa: PLC0415 - half a second, paid by users of kernels only
+
+    config: Any = numba.config
+    if config.DISABLE_JIT:
+        return function
+    package = function.__module__.partition(".")[0]
+    folder = _prepared_folder(package, "" if _package_folders(package) else function.__code__.co_filename)
+    with _config_lock:
+        before = config.CACHE_DIR
+        config.CACHE_DIR = str(folder)  # read by njit when it makes the function's cache, that is here
+        try:
+            compiled = numba.njit(cache=True)(function)
+        finally:
+            config.CACHE_DIR = before
+    return cast("F", compiled)
+
+
+def is_cold(package: str) -> bool:
+    """Tell whether no kernel of the top-level `package`, as it is now, was compiled for this user yet.
+
+    Imports neither Numba nor the package, so that a command can say that its first run takes longer.
+    """
+    if os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0"):
+        return False
+    return next(cache_folder(package).rglob("*.nbi"), None) is None
+
+
+def cache_folder(package: str) -> Path:
+    """Return the folder for the compiled kernels of `package` as it is now; it may not exist yet."""
+    if not _package_folders(package):
+        raise ModuleNotFoundError(f"there is no package {package!r} here, so it has no kernels", name=package)
+    return _user_root() / "kernels" / package / _key(package, "")
+
+
+@functools.cache
+def _prepared_folder(package: str, source: str) -> Path:
+    """Make the package's folder, mark it as used now, and drop the oldest builds beyond KEPT_BUILDS."""
+    folder = _user_root() / "kernels" / package / _key(package, source)
+    folder.mkdir(parents=True, exist_ok=True)
+    os.utime(folder)
+    builds = sorted((b for b in folder.parent.iterdir() if _KEY_NAME.fullmatch(b.name)), key=_mtime, reverse=True)
+    for old in builds[KEPT_BUILDS:]:
+        shutil.rmtree(old, ignore_errors=True)
+    return folder
+
+
+def _mtime(path: Path) -> float:
+    try:
+        return path.stat().st_mtime
+    except FileNotFoundError:  # another process removed it meanwhile
+        return 0.0
+
+
+@functools.cache
+def _key(package: str, source: str) -> str:
+    """Hash what can end up in the compiled code of `package`; `source` is its file when it is one module."""
+    folders = _package_folders(package)
+    digest = hashlib.sha256()
+    settings = sorted(item for item in os.environ.items() if item[0].startswith("NUMBA_"))
+    digest.update(repr((sys.version, metadata.version("numba"), settings)).encode())
+    for name, text in sorted(_kernel_sources(package, folders, Path(source)).items()):
+        digest.update(f"\n{name}\n{len(text)}\n".encode())
+        digest.update(text)
+    return digest.hexdigest()[:16]
+
+
+def _package_folders(package: str) -> list[Path]:
+    """Return where the package's files are; nothing for a single module, a script or an unknown name."""
+    if package in sys.modules:
+        return [Path(folder) for folder in getattr(sys.modules[package], "__path__", ())]
+    spec = importlib.util.find_spec(package)
+    return [Path(folder) for folder in (spec.submodule_search_locations or ())] if spec else []
+
+
+def _kernel_sources(package: str, folders: list[Path], source: Path) -> dict[str, bytes]:
+    """Return the text, by dotted module name, of every file that can take part in the compiled code."""
+    roots = {package: folders, "planarm_wire": [Path(__file__).parent]}
+    found: dict[str, bytes] = {}
+    if not folders and source.is_file():
+        found[package] = source.read_bytes()
+    for folder in folders:
+        for path in folder.rglob("*.py"):
+            text = path.read_bytes()
+            if _MARK in text:
+                found[_module_name(package, folder, path)] = text
+    waiting = list(found.items())
+    while waiting:
+        for imported in _imported_modules(*waiting.pop()):
+            file = _find_module(imported, roots)
+            if file is not None and imported not in found:
+                found[imported] = file.read_bytes()
+                waiting.append((imported, found[imported]))
+    return found
+
+
+def _module_name(package: str, folder: Path, path: Path) -> str:
+    """Return a module's dotted name; a package's own file keeps `__init__`, so relative imports are plain."""
+    return ".".join((package, *path.relative_to(folder).with_suffix("").parts))
+
+
+def _imported_modules(name: str, text: bytes) -> Iterator[str]:
+    """Yield the dotted names that a module's imports at the left margin may mean; some are no modules."""
+    for base, names, plain in _IMPORT.findall(text):
+        if plain:
+            targets = [n.decode() for n in _NAME.findall(plain)]
+        else:
+            dots = len(base) - len(base.lstrip(b"."))
+            parts = name.split(".")[:-dots] if dots else []
+            module = ".".join((*parts, *filter(None, base.decode().split("."))))
+            targets = [module, *(f"{module}.{n.decode()}" for n in _NAME.findall(names))]
+        for target in targets:
+            yield target
+            yield f"{target}.__init__"
+
+
+def _find_module(name: str, roots: dict[str, list[Path]]) -> Path | None:
+    top, *rest = name.split(".")
+    if not rest:
+        return None
+    paths = (folder.joinpath(*rest).with_suffix(".py") for folder in roots.get(top, ()))
+    return next((path for path in paths if path.is_file()), None)
+
+
+@functools.cache
+def _user_root() -> Path:
+    """Return planarm's writable cache folder for this user (see the module's text for the order)."""
+    named = os.environ.get(CACHE_DIR_VARIABLE)
+    if named:
+        folder = Path(named).absolute()
+        problem = _write_problem(folder)
+        if problem is not None:
+            raise OSError(
+                problem.errno,
+                f"{CACHE_DIR_VARIABLE} names a folder that cannot be written ({problem.strerror}); "
+                f"set it to a writable folder, or unset it",
+                str(folder),
+            )
+        return folder
+    usual = _usual_folder()
+    if usual is not None and _write_problem(usual) is None:
+        return usual
+    return _temporary_folder()
+
+
+def _usual_folder() -> Path | None:
+    """Return the platform's cache folder for planarm, or None when the user's home is not known."""
+    try:
+        home = Path.home()
+    except RuntimeError:
+        return None
+    if sys.platform == "win32":
+        return Path(os.environ.get("LOCALAPPDATA") or home / "AppData" / "Local") / "planarm" / "Cache"
+    if sys.platform == "darwin":
+        return home / "Library" / "Caches" / "planarm"
+    return Path(os.environ.get("XDG_CACHE_HOME") or home / ".cache") / "planarm"
+
+
+def _temporary_folder() -> Path:
+    """Return a folder below the temporary folder that belongs to this user and to nobody else.
+
+    The cache is unpickled by Numba, so a folder that another user prepared must not be read.
+    """
+    user = os.getuid() if hasattr(os, "getuid") else 0
+    folder = Path(tempfile.gettempdir()) / f"planarm-cache-{user}"
+    folder.mkdir(mode=0o700, exist_ok=True)
+    status = folder.lstat()
+    private = stat.S_ISDIR(status.st_mode) and status.st_uid == user and not status.st_mode & 0o022
+    if (private or not hasattr(os, "getuid")) and _write_problem(folder) is None:
+        return folder
+    return Path(tempfile.mkdtemp(prefix="planarm-cache-"))
+
+
+def _write_problem(folder: Path) -> OSError | None:
+    """Try to make `folder` and to write in it; return what stands in the way, or None."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=folder):
+            return None
+    except OSError as problem:
+        return problem
