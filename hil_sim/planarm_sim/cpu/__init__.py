@@ -1,0 +1,1 @@
+"""The ATmega328P: instruction set, interrupts, data space."""

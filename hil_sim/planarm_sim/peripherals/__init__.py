@@ -1,0 +1,1 @@
+"""The ATmega328P's peripherals, as kernels over one state array."""
