@@ -1,0 +1,1 @@
+"""The arm as geometry: links, kinematics, shapes of obstacles, distances between them."""

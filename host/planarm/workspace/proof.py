@@ -1,0 +1,185 @@
+"""Proofs that a moving arm stays free, by a bound on its motion; nothing here is sampled.
+
+The bound. Let the tip stay in a disc of radius rho around c, r_c from the base. Its direction phi changes by at most
+asin(rho / r_c), its distance r stays in [r_c - rho, r_c + rho], clipped to what reach and theta2's limits allow.
+With theta1 = phi +- beta(r), cos beta = (r^2 + l1^2 - l2^2) / (2 r l1), beta has its extremes at the ends of that
+range or at r* = sqrt(l1^2 - l2^2), where link 2 stands at a right angle to the tip's direction. So theta1 changes by
+at most dtheta1 = asin(rho / r_c) + max |beta(r) - beta(r_c)|, the elbow moves at most 2 l1 sin(dtheta1 / 2), every
+point of link 1 no farther than the elbow, and every point of link 2, whose displacement lies between those of its
+ends, no farther than the farther-moving end. A disc is free when the clearance at its centre exceeds the margin by
+more than this.
+
+A line or curve is proved free by covering it with discs, found by bisection.
+"""
+
+from math import acos, asin, hypot, pi, sin, sqrt
+
+from planarm_wire.kernel_cache import kernel
+
+from planarm.model.collision import cross, point_segment_distance2
+from planarm.model.kinematics import ROUNDING_CM
+from planarm.workspace.world import (
+    FREE,
+    ArmWorld,
+    cos_elbow_angle,
+    distance_region,
+    elbow_position,
+    floor_clearance,
+    obstacle_clearance,
+    theta1_at,
+)
+
+# Verdicts: the whole piece is free; a pose on it is not (the counterexample is told); neither could be shown.
+PROVED, BLOCKED, UNPROVED = 0, 1, 2
+
+SMALLEST_CM = 1e-3
+"""Radius of the smallest disc of a cover: what cannot be proved with it stays unproved."""
+
+
+@kernel
+def motion_bound(world: ArmWorld, r_cm: float, rho_cm: float) -> tuple[float, float]:
+    """Return bounds (of theta1's change in rad, of any point's displacement in cm) while the tip stays in a disc.
+
+    Args:
+        world: the arm.
+        r_cm: distance of the disc's centre from the base, within reach and limits.
+        rho_cm: the disc's radius.
+    """
+    low, high = max(r_cm - rho_cm, world.r_min_cm), min(r_cm + rho_cm, world.r_max_cm)
+    beta = acos(cos_elbow_angle(world, r_cm))
+    beta_low, beta_high = acos(cos_elbow_angle(world, low)), acos(cos_elbow_angle(world, high))
+    dbeta = max(abs(beta_low - beta), abs(beta_high - beta))
+    extreme2 = world.l1_cm * world.l1_cm - world.l2_cm * world.l2_cm
+    if low * low < extreme2 < high * high:
+        dbeta = max(dbeta, abs(acos(cos_elbow_angle(world, sqrt(extreme2))) - beta))
+    dphi = asin(rho_cm / r_cm) if rho_cm < r_cm else pi
+    dtheta1 = min(pi, dphi + dbeta)
+    return dtheta1, max(rho_cm, 2.0 * world.l1_cm * sin(0.5 * dtheta1))
+
+
+@kernel
+def disc_verdict(world: ArmWorld, x_cm: float, y_cm: float, rho_cm: float) -> int:
+    """Judge all poses with the tip in the disc around (x, y), as far as its tip distances are within reach and limits.
+
+    BLOCKED means that the pose at the centre is not free.
+    """
+    r = hypot(x_cm - world.base_x_cm, y_cm - world.base_y_cm)
+    if distance_region(world, r) != FREE:
+        return BLOCKED
+    ex, ey = elbow_position(world, x_cm, y_cm, r)
+    distance, _ = obstacle_clearance(world, ex, ey, x_cm, y_cm)
+    spare = min(distance, floor_clearance(world, ey, y_cm)) - world.margin_cm
+    theta1 = theta1_at(world, x_cm, y_cm, acos(cos_elbow_angle(world, r)))
+    if spare <= 0.0 or theta1 < world.theta1_min_rad or theta1 > world.theta1_max_rad:
+        return BLOCKED
+    dtheta1, displacement = motion_bound(world, r, rho_cm)
+    within_limits = theta1 - dtheta1 >= world.theta1_min_rad and theta1 + dtheta1 <= world.theta1_max_rad
+    return PROVED if within_limits and spare > displacement + ROUNDING_CM else UNPROVED
+
+
+@kernel
+def disc_within_reach(world: ArmWorld, r_cm: float, rho_cm: float) -> bool:
+    """Tell whether every point of a disc, its centre r from the base, is within reach and the limits of theta2."""
+    return r_cm - rho_cm >= world.r_min_cm and r_cm + rho_cm <= world.r_max_cm
+
+
+@kernel
+def next_piece(start: float, width: float) -> tuple[float, float]:
+    """Return (start, width) of the piece to judge after [start, start + width] of a bisection of [0, 1] is settled."""
+    start += width
+    while width < 1.0 and start % (2.0 * width) == 0.0:
+        width *= 2.0
+    return start, width
+
+
+@kernel
+def prove_line(world: ArmWorld, x0: float, y0: float, x1: float, y1: float) -> tuple[int, float]:
+    """Judge the straight move of the tip from (x0, y0) to (x1, y1), in cm.
+
+    The tip's least distance from the base on the move is taken exactly, the greatest is at an end.
+
+    Returns:
+        (verdict, parameter): PROVED; or BLOCKED with the share of the move, 0 to 1, at which the pose is not free; or
+        UNPROVED with the share around which the margin is too small for a proof.
+    """
+    dx, dy = x1 - x0, y1 - y0
+    length = hypot(dx, dy)
+    toward_base = (world.base_x_cm - x0) * dx + (world.base_y_cm - y0) * dy
+    nearest = min(1.0, max(0.0, toward_base / (length * length))) if length > 0.0 else 0.0
+    for share in (0.0, 1.0, nearest):
+        r = hypot(x0 + share * dx - world.base_x_cm, y0 + share * dy - world.base_y_cm)
+        if distance_region(world, r) != FREE:
+            return BLOCKED, share
+    start, width = 0.0, 1.0
+    while start < 1.0:
+        middle = start + 0.5 * width
+        rho = 0.5 * width * length
+        verdict = disc_verdict(world, x0 + middle * dx, y0 + middle * dy, rho)
+        if verdict == PROVED:
+            start, width = next_piece(start, width)
+        elif verdict == BLOCKED or rho <= SMALLEST_CM:
+            return verdict, middle
+        else:
+            width *= 0.5
+    return PROVED, 1.0
+
+
+@kernel
+def prove_curve(world: ArmWorld, x0: float, y0: float, x1: float, y1: float, x2: float, y2: float) -> tuple[int, float]:
+    """Judge the tip's move along the quadratic Bezier curve with the control points 0, 1, 2, in cm.
+
+    Each piece of the curve lies in the triangle of its own control points: that triangle must be within reach and
+    limits, and a disc around the piece's middle that holds it must be free. Returns (verdict, parameter) as
+    `prove_line` does; the parameter is the curve's, 0 to 1.
+    """
+    start, width = 0.0, 1.0
+    while start < 1.0:
+        end = start + width
+        ax, bx, cx = bezier_piece(x0, x1, x2, start, end)
+        ay, by, cy = bezier_piece(y0, y1, y2, start, end)
+        mx, my = 0.25 * (ax + 2.0 * bx + cx), 0.25 * (ay + 2.0 * by + cy)
+        rho = max(hypot(ax - mx, ay - my), hypot(bx - mx, by - my), hypot(cx - mx, cy - my))
+        verdict = disc_verdict(world, mx, my, rho)
+        if verdict == PROVED and not triangle_within_reach(world, ax, ay, bx, by, cx, cy):
+            verdict = UNPROVED
+        if verdict == PROVED:
+            start, width = next_piece(start, width)
+        elif verdict == BLOCKED or rho <= SMALLEST_CM:
+            return verdict, start + 0.5 * width
+        else:
+            width *= 0.5
+    return PROVED, 1.0
+
+
+@kernel
+def bezier_piece(p0: float, p1: float, p2: float, start: float, end: float) -> tuple[float, float, float]:
+    """Return the control values of the piece [start, end] of a quadratic Bezier, one coordinate (blossoming)."""
+    return (
+        blossom(p0, p1, p2, start, start),
+        blossom(p0, p1, p2, start, end),
+        blossom(p0, p1, p2, end, end),
+    )
+
+
+@kernel
+def blossom(p0: float, p1: float, p2: float, s: float, t: float) -> float:
+    """Return the polar form of a quadratic Bezier: its value for s = t, a piece's control value for s < t."""
+    return (1.0 - s) * ((1.0 - t) * p0 + t * p1) + s * ((1.0 - t) * p1 + t * p2)
+
+
+@kernel
+def triangle_within_reach(world: ArmWorld, ax: float, ay: float, bx: float, by: float, cx: float, cy: float) -> bool:
+    """Tell whether every point of a triangle is within reach and the limits of theta2, so outside the inner hole."""
+    ox, oy = world.base_x_cm, world.base_y_cm
+    a_left = cross(bx - ax, by - ay, ox - ax, oy - ay) > 0.0
+    b_left = cross(cx - bx, cy - by, ox - bx, oy - by) > 0.0
+    c_left = cross(ax - cx, ay - cy, ox - cx, oy - cy) > 0.0
+    if a_left == b_left == c_left:  # the base lies inside
+        return False
+    farthest = max(hypot(ax - ox, ay - oy), hypot(bx - ox, by - oy), hypot(cx - ox, cy - oy))
+    nearest2 = min(
+        point_segment_distance2(ox, oy, ax, ay, bx, by),
+        point_segment_distance2(ox, oy, bx, by, cx, cy),
+        point_segment_distance2(ox, oy, cx, cy, ax, ay),
+    )
+    return distance_region(world, farthest) == FREE and distance_region(world, sqrt(nearest2)) == FREE
