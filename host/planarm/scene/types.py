@@ -1,8 +1,4 @@
-"""Scenes: a TOML file read strictly into frozen dataclasses.
-
-This is the only place where units are converted: the file speaks centimetres and degrees, everything behind it
-centimetres and radians. docs/scene.md is the reference of the format.
-"""
+"""What a scene says, as frozen dataclasses in centimetres and radians."""
 
 from dataclasses import dataclass
 from math import pi

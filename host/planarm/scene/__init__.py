@@ -1,0 +1,45 @@
+"""Scenes: a TOML file read strictly into frozen dataclasses.
+
+This is the only place where units are converted: the file speaks centimetres and degrees, everything behind it
+centimetres and radians. docs/scene.md is the reference of the format.
+"""
+
+from planarm.scene.load import load_scene, parse_scene, with_planner
+from planarm.scene.types import (
+    Algorithm,
+    ArmSpec,
+    Elbow,
+    JointSpec,
+    LinkSpec,
+    Moves,
+    Obstacle,
+    PlannerSpec,
+    Point,
+    Range,
+    Scene,
+    Shape,
+    Subset,
+    TaskSpec,
+    WorkspaceSpec,
+)
+
+__all__ = [
+    "Algorithm",
+    "ArmSpec",
+    "Elbow",
+    "JointSpec",
+    "LinkSpec",
+    "Moves",
+    "Obstacle",
+    "PlannerSpec",
+    "Point",
+    "Range",
+    "Scene",
+    "Shape",
+    "Subset",
+    "TaskSpec",
+    "WorkspaceSpec",
+    "load_scene",
+    "parse_scene",
+    "with_planner",
+]

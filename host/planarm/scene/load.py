@@ -1,0 +1,238 @@
+"""Reading a scene file into a Scene: the keys of every table, their limits and their defaults."""
+
+import tomllib
+from dataclasses import replace
+from math import ceil, floor, radians
+from pathlib import Path
+
+from planarm.errors import SceneError
+from planarm.scene.simple_polygon import polygon_problem
+from planarm.scene.strict_toml import Table
+from planarm.scene.types import (
+    Algorithm,
+    ArmSpec,
+    Elbow,
+    JointSpec,
+    LinkSpec,
+    Moves,
+    Obstacle,
+    PlannerSpec,
+    Range,
+    Scene,
+    Shape,
+    Subset,
+    TaskSpec,
+    WorkspaceSpec,
+)
+
+ROOT_KEYS = ("name", "arm", "workspace", "obstacles", "task", "planner", "joints", "link")
+ARM_KEYS = ("link_lengths_cm", "link_width_cm", "base_cm", "elbow", "joint_limits_deg", "floor")
+WORKSPACE_KEYS = ("x_cm", "y_cm", "cell_cm", "clearance_cm")
+ROUND_KEYS = ("shape", "center_cm", "diameter_cm")
+POLYGON_KEYS = ("shape", "vertices_cm")
+TASK_KEYS = ("start_cm", "goal_cm")
+PLANNER_KEYS = ("algorithm", "neighbours", "subset", "seed", "moves")
+JOINT_KEYS = ("steps_per_rev", "microsteps", "gear_ratio", "driver", "max_speed_deg_s", "max_acceleration_deg_s2")
+LINK_KEYS = ("port", "baud")
+
+ELBOWS: tuple[Elbow, ...] = ("up", "down", "either")
+SHAPES: tuple[Shape, ...] = ("circle", "square", "diamond", "triangle", "hexagon", "polygon")
+SUBSETS: tuple[Subset, ...] = ("run", "expansion")
+MOVES: tuple[Moves, ...] = ("proved", "nodes")
+DRIVERS = ("a4988", "drv8825", "tmc2209", "dm542")
+NEIGHBOURS: dict[Algorithm, tuple[int, ...]] = {
+    "a_star": (8,),
+    "modified_a_star": (24, 48),
+    "chaos_a_star": (44, 8, 20, 68),
+    "chs": (56, 12, 28, 48, 80),
+}
+"""The neighbourhoods that each algorithm knows (paper C, sections IV to VII); the first is the default."""
+
+LINKS = 2
+"""The links that planning and firmware serve."""
+LARGEST_CM = 10_000.0
+MOST_GRID_NODES = 20_000_000
+JOINT_LIMITS_DEG: tuple[Range, ...] = ((-90.0, 270.0), (-180.0, 180.0))
+"""Without limits joint 1 may turn once round, from straight down to straight down."""
+
+
+def load_scene(path: str | Path) -> Scene:
+    """Read a scene file.
+
+    Raises:
+        SceneError: the file cannot be read, is not TOML, or is not a scene (docs/scene.md).
+    """
+    try:
+        text = Path(path).read_text(encoding="utf-8")
+    except OSError as problem:
+        raise SceneError(
+            str(path), "", f"cannot be read: {problem.strerror}; give the path of a scene file"
+        ) from problem
+    except UnicodeDecodeError as problem:
+        raise SceneError(str(path), "", f"is not UTF-8 text: byte {problem.start} cannot be decoded") from problem
+    return parse_scene(text, str(path))
+
+
+def parse_scene(text: str, source: str) -> Scene:
+    """Read a scene from TOML text; `source` names it in errors, and in the scene unless the text gives a name.
+
+    Raises:
+        SceneError: the text is not TOML, or is not a scene (docs/scene.md).
+    """
+    try:
+        data = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as problem:
+        raise SceneError(source, "", f"is not valid TOML: {problem}") from problem
+    root = Table.with_keys(source, "", data, ROOT_KEYS)
+    workspace = _workspace(root.table("workspace", WORKSPACE_KEYS))
+    return Scene(
+        name=root.text("name", Path(source).stem or source),
+        source=source,
+        arm=_arm(root.table("arm", ARM_KEYS)),
+        workspace=workspace,
+        obstacles=tuple(_obstacle(source, path, entry) for path, entry in root.tables("obstacles")),
+        task=_task(root.table("task", TASK_KEYS), workspace),
+        planner=_planner(root.table("planner", PLANNER_KEYS, optional=True)),
+        joints=_joints(root),
+        link=_link(root.table("link", LINK_KEYS, optional=True)),
+    )
+
+
+def with_planner(
+    scene: Scene, *, algorithm: str | None = None, neighbours: int | None = None, seed: int | None = None
+) -> Scene:
+    """Return the scene with another algorithm, neighbourhood or seed; None keeps what the scene says.
+
+    A new algorithm without `neighbours` takes its default neighbourhood.
+
+    Raises:
+        SceneError: the algorithm is not known, or has no such neighbourhood, or the seed is negative.
+    """
+    before = scene.planner
+    changed: dict[str, object] = {
+        "algorithm": before.algorithm if algorithm is None else algorithm,
+        "subset": before.subset,
+        "seed": before.seed if seed is None else seed,
+        "moves": before.moves,
+    }
+    if neighbours is not None:
+        changed["neighbours"] = neighbours
+    elif changed["algorithm"] == before.algorithm:
+        changed["neighbours"] = before.neighbours
+    return replace(scene, planner=_planner(Table(scene.source, "planner", changed)))
+
+
+def _arm(table: Table) -> ArmSpec:
+    lengths = table.numbers("link_lengths_cm", above=0.0, at_most=LARGEST_CM)
+    if len(lengths) != LINKS:
+        table.reject("link_lengths_cm", list(lengths), f"{LINKS} lengths (arms with {LINKS} links are planned)")
+    base, on_floor = table.point("base_cm", (0.0, 0.0), within=LARGEST_CM), table.flag("floor", False)
+    if on_floor and base[1] < 0.0:
+        table.reject("base_cm", list(base), "a base on or above y = 0, because arm.floor is true,")
+    return ArmSpec(
+        link_lengths_cm=lengths,
+        link_width_cm=table.number("link_width_cm", above=0.0, at_most=LARGEST_CM),
+        base_cm=base,
+        elbow=table.choice("elbow", ELBOWS),
+        joint_limits_rad=_joint_limits_rad(table),
+        floor=on_floor,
+    )
+
+
+def _joint_limits_rad(table: Table) -> tuple[Range, ...]:
+    key = "joint_limits_deg"
+    limits = table.ranges(key, JOINT_LIMITS_DEG, within=720.0)
+    if len(limits) != LINKS:
+        table.reject(key, [list(r) for r in limits], f"one [least, greatest] for each of the {LINKS} joints")
+    (low1, high1), (low2, high2) = limits
+    if high1 - low1 > 360.0:
+        problem = "a range of at most 360 degrees for joint 1 (a wider one gives a tip position several angles)"
+        table.reject(key, [low1, high1], problem)
+    if low2 < -180.0 or high2 > 180.0:
+        table.reject(key, [low2, high2], "a range within [-180, 180] degrees for joint 2")
+    return tuple((radians(low), radians(high)) for low, high in limits)
+
+
+def _workspace(table: Table) -> WorkspaceSpec:
+    x, y = table.range("x_cm", within=LARGEST_CM), table.range("y_cm", within=LARGEST_CM)
+    cell = table.number("cell_cm", 1.0, above=0.0, at_most=LARGEST_CM)
+    columns, rows = (max(0, floor(high / cell) - ceil(low / cell) + 1) for low, high in (x, y))
+    if columns * rows > MOST_GRID_NODES:
+        least = ((x[1] - x[0]) * (y[1] - y[0]) / MOST_GRID_NODES) ** 0.5
+        problem = (
+            f"{cell:g} gives a grid of {columns} x {rows} = {columns * rows} nodes, the limit is {MOST_GRID_NODES}; "
+            f"take cells above {least:.3g} centimetres, or a smaller workspace"
+        )
+        table.fail("cell_cm", problem)
+    if min(columns, rows) < 2:
+        table.fail(
+            "cell_cm", f"{cell:g} gives a grid of {columns} x {rows} nodes, 2 x 2 are the least; take smaller cells"
+        )
+    return WorkspaceSpec(x, y, cell, table.number("clearance_cm", 0.0, at_least=0.0, at_most=LARGEST_CM))
+
+
+def _obstacle(source: str, path: str, data: object) -> Obstacle:
+    entry = Table.with_keys(source, path, data, sorted({*ROUND_KEYS, *POLYGON_KEYS}))
+    shape = entry.choice("shape", SHAPES)
+    if shape == "polygon":
+        table = Table.with_keys(source, path, data, POLYGON_KEYS)
+        vertices = table.points("vertices_cm", within=LARGEST_CM)
+        problem = polygon_problem(vertices)
+        if problem:
+            table.fail("vertices_cm", problem)
+        return Obstacle(shape, vertices_cm=vertices)
+    table = Table.with_keys(source, path, data, ROUND_KEYS)
+    return Obstacle(
+        shape,
+        center_cm=table.point("center_cm", within=LARGEST_CM),
+        diameter_cm=table.number("diameter_cm", above=0.0, at_most=LARGEST_CM),
+    )
+
+
+def _task(table: Table, workspace: WorkspaceSpec) -> TaskSpec:
+    for key in TASK_KEYS:
+        point = table.point(key, within=LARGEST_CM)
+        for axis, value, (low, high) in zip("xy", point, (workspace.x_cm, workspace.y_cm), strict=True):
+            if not low <= value <= high:
+                wanted = f"{axis} from {low:g} to {high:g} (workspace.{axis}_cm)"
+                table.reject(key, list(point), wanted)
+    return TaskSpec(table.point("start_cm", within=LARGEST_CM), table.point("goal_cm", within=LARGEST_CM))
+
+
+def _planner(table: Table) -> PlannerSpec:
+    algorithm = table.choice("algorithm", tuple(NEIGHBOURS), "chs")
+    known = NEIGHBOURS[algorithm]
+    neighbours = table.integer("neighbours", known[0], at_least=1, at_most=1000)
+    if neighbours not in known:
+        table.reject("neighbours", neighbours, f"one of {', '.join(map(str, sorted(known)))} (algorithm {algorithm!r})")
+    return PlannerSpec(
+        algorithm=algorithm,
+        neighbours=neighbours,
+        subset=table.choice("subset", SUBSETS, "run"),
+        seed=table.integer("seed", 1, at_least=0, at_most=2**32 - 1),
+        moves=table.choice("moves", MOVES, "proved"),
+    )
+
+
+def _joints(root: Table) -> tuple[JointSpec, ...]:
+    entries = root.tables("joints")
+    if len(entries) != LINKS:
+        root.fail(
+            "joints", f"{len(entries)} given, {LINKS} expected: one [[joints]] table for each link, from the base"
+        )
+    return tuple(_joint(Table.with_keys(root.source, path, entry, JOINT_KEYS)) for path, entry in entries)
+
+
+def _joint(table: Table) -> JointSpec:
+    return JointSpec(
+        steps_per_rev=table.integer("steps_per_rev", 200, at_least=1, at_most=100_000),
+        microsteps=table.integer("microsteps", 16, at_least=1, at_most=256),
+        gear_ratio=table.number("gear_ratio", 1.0, above=0.0, at_most=10_000.0),
+        driver=table.choice("driver", DRIVERS, "a4988"),
+        max_speed_rad_s=radians(table.number("max_speed_deg_s", above=0.0, at_most=1e6)),
+        max_acceleration_rad_s2=radians(table.number("max_acceleration_deg_s2", above=0.0, at_most=1e6)),
+    )
+
+
+def _link(table: Table) -> LinkSpec:
+    return LinkSpec(table.text("port", "sim://"), table.integer("baud", 250_000, at_least=1200, at_most=2_000_000))
