@@ -1,0 +1,140 @@
+"""Writes messages.h: the wire's numbers for the firmware, in C++14 that avr-gcc 5.4 takes.
+
+Only constants and enumerations: nothing in it takes flash or RAM until it is used.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+
+from planarm_wire.generators.text import NOTICE, byte_range, class_name, sentence, wrapped
+from planarm_wire.layout import SCALARS
+from planarm_wire.spec import ENUMS, Code, MessageSpec, Spec, StructSpec
+
+_HEAD = """\
+// The wire's numbers and codes. docs/protocol.md tells the rules around them.
+//
+// {notice}
+#pragma once
+
+#include <stdint.h>
+
+namespace planarm {{
+namespace wire {{
+"""
+
+_TAIL = """
+static_assert(MAX_FRAME_BYTES <= HOST_WINDOW_BYTES, "the longest frame fits the host's window");
+static_assert(HOST_WINDOW_BYTES < RX_RING_BYTES, "a full window fits the receive ring");
+
+}  // namespace wire
+}  // namespace planarm
+"""
+
+
+def messages_h(spec: Spec) -> str:
+    """Return the text of messages.h."""
+    lines = [_HEAD.format(notice=NOTICE)]
+    lines.extend(_constants(spec))
+    lines.append("")
+    lines.extend(_pins("Step outputs, one a joint, as numbered on the board.", "STEP_PINS", spec.board.step_pins))
+    lines.extend(_pins("Direction outputs; high is the positive direction.", "DIR_PINS", spec.board.dir_pins))
+    lines.append(_constant("ENABLE_PIN", "uint8_t", str(_pin(spec.board.enable_pin)), "Active low."))
+    codes = ((m.name, m.code, f"From the {m.sender}: {m.doc}") for m in spec.messages)
+    lines.extend(_enum("MessageType", "uint8_t", "Type codes of the messages.", codes))
+    sections: tuple[tuple[str, str, str, tuple[Code, ...]], ...] = (
+        ("states", "uint8_t", "What the device is doing.", spec.states),
+        ("faults", "uint8_t", "Why the device stopped its pulses.", spec.faults),
+        ("results", "int8_t", "How a command went: 0 done, above 0 send it again, below 0 refused.", spec.results),
+    )
+    for section, base, doc, entries in sections:
+        lines.extend(_enum(ENUMS[section], base, doc, ((e.name, e.code, e.text) for e in entries)))
+    structs = {struct.name: struct for struct in spec.structs}
+    for message in spec.messages:
+        lines.extend(_layout(message, structs))
+    return "\n".join(lines) + "\n" + _TAIL
+
+
+def _constants(spec: Spec) -> Iterator[str]:
+    framing = spec.framing
+    yield _constant("PROTOCOL_VERSION", "uint8_t", str(spec.version), "Both ends must have the same.")
+    yield _constant("SPEC_HASH", "uint32_t", f"0x{spec.spec_hash:08X}", "Of the specification without its wording.")
+    yield ""
+    yield _constant("DELIMITER", "uint8_t", f"0x{framing.delimiter:02X}", "Ends every frame.")
+    yield _constant("ESCAPE", "uint8_t", f"0x{framing.escape:02X}", "Announces an escaped byte.")
+    yield _constant("ESCAPE_XOR", "uint8_t", f"0x{framing.escape_xor:02X}", "An escaped byte is its code xor this.")
+    reserved = ", ".join(f"0x{code:02X}" for code in framing.reserved)
+    yield "// Never inside a frame; receivers drop them."
+    yield f"constexpr uint8_t RESERVED[{len(framing.reserved)}] = {{{reserved}}};"
+    yield _constant("CRC_INITIAL", "uint16_t", f"0x{framing.crc_initial:04X}", framing.crc)
+    yield _constant("HEADER_BYTES", "uint8_t", str(framing.header_bytes), "Length, seq and type.")
+    yield _constant("CRC_BYTES", "uint8_t", str(framing.crc_bytes), "Of each of the two checks.")
+    yield _constant("MAX_PAYLOAD_BYTES", "uint8_t", str(framing.max_payload_bytes), "Before stuffing.")
+    yield _constant(
+        "MAX_FRAME_BYTES", "uint8_t", str(framing.max_frame_bytes), "On the line, all stuffed, with delimiter."
+    )
+    yield ""
+    for limit in spec.limits:
+        yield _constant(limit.name.upper(), _type(limit.value), str(limit.value), limit.doc)
+
+
+def _type(value: int) -> str:
+    """Return the narrowest unsigned type, so that arithmetic with it stays narrow on an 8-bit core."""
+    return "uint8_t" if value <= 0xFF else "uint16_t" if value <= 0xFFFF else "uint32_t"
+
+
+def _constant(name: str, kind: str, value: str, doc: str) -> str:
+    suffix = {"uint32_t": "UL", "uint16_t": "U"}.get(kind, "")
+    return f"{wrapped(sentence(doc), '// ', 100)}\nconstexpr {kind} {name} = {value}{suffix};"
+
+
+def _pins(doc: str, name: str, pins: Iterable[str]) -> Iterator[str]:
+    numbers = ", ".join(str(_pin(pin)) for pin in pins)
+    yield f"// {doc}"
+    yield f"constexpr uint8_t {name}[JOINTS] = {{{numbers}}};"
+
+
+def _pin(pin: str) -> int:
+    """Return the board's number of a pin: D9 is 9, A0 is 14 (Arduino Uno)."""
+    return int(pin[1:]) + (14 if pin[0] == "A" else 0)
+
+
+def _enum(name: str, base: str, doc: str, members: Iterable[tuple[str, int, str]]) -> Iterator[str]:
+    yield f"\n// {doc}\nenum class {name} : {base} {{"
+    for member, code, text in members:
+        yield wrapped(sentence(text), "    // ", 100)
+        yield f"    {member.upper()} = {code if code < 10 else hex(code)},"
+    yield "};"
+
+
+def _layout(message: MessageSpec, structs: Mapping[str, StructSpec]) -> Iterator[str]:
+    """Yield the payload's size and, when the layout is fixed, where each field starts."""
+    name = message.name.upper()
+    yield f"\n// {class_name(message.name)}: payload of {byte_range(message.min_bytes, message.max_bytes)}."
+    if message.min_bytes != message.max_bytes:
+        yield f"constexpr uint8_t {name}_MIN_BYTES = {message.min_bytes};"
+        return
+    yield f"constexpr uint8_t {name}_BYTES = {message.max_bytes};"
+    if not message.fields:
+        return
+    yield f"namespace {message.name}_at {{"
+    rows = [(f"constexpr uint8_t {f.upper()} = {at};", kind) for f, kind, at in _offsets(message, structs, "", 0)]
+    width = max(len(row) for row, _ in rows)
+    for row, kind in rows:
+        yield f"{row:{width}}  // {kind}"
+    yield f"}}  // namespace {message.name}_at"
+
+
+def _offsets(
+    item: MessageSpec | StructSpec, structs: Mapping[str, StructSpec], prefix: str, offset: int
+) -> Iterator[tuple[str, str, int]]:
+    for field in item.fields:
+        name = f"{prefix}{field.name}"
+        times = field.count or 1
+        kind = f"{field.kind} x {times}" if field.count else field.kind
+        if field.kind in SCALARS:
+            yield name, f"{kind}{'' if field.unit == '1' else ', ' + field.unit}", offset
+            offset += SCALARS[field.kind].max_bytes * times
+        else:
+            yield from _offsets(structs[field.kind], structs, f"{name}_", offset)
+            offset += structs[field.kind].max_bytes * times
