@@ -2,7 +2,7 @@
 
 import tomllib
 from dataclasses import replace
-from math import ceil, floor, radians
+from math import radians
 from pathlib import Path
 
 from planarm.errors import SceneError
@@ -51,6 +51,7 @@ NEIGHBOURS: dict[Algorithm, tuple[int, ...]] = {
 LINKS = 2
 """The links that planning and firmware serve."""
 LARGEST_CM = 10_000.0
+SMALLEST_CELL_CM = 0.001
 MOST_GRID_NODES = 20_000_000
 JOINT_LIMITS_DEG: tuple[Range, ...] = ((-90.0, 270.0), (-180.0, 180.0))
 """Without limits joint 1 may turn once round, from straight down to straight down."""
@@ -154,21 +155,19 @@ def _joint_limits_rad(table: Table) -> tuple[Range, ...]:
 
 
 def _workspace(table: Table) -> WorkspaceSpec:
-    x, y = table.range("x_cm", within=LARGEST_CM), table.range("y_cm", within=LARGEST_CM)
-    cell = table.number("cell_cm", 1.0, above=0.0, at_most=LARGEST_CM)
-    columns, rows = (max(0, floor(high / cell) - ceil(low / cell) + 1) for low, high in (x, y))
+    workspace = WorkspaceSpec(
+        x_cm=table.range("x_cm", within=LARGEST_CM),
+        y_cm=table.range("y_cm", within=LARGEST_CM),
+        cell_cm=table.number("cell_cm", 1.0, at_least=SMALLEST_CELL_CM, at_most=LARGEST_CM),
+        clearance_cm=table.number("clearance_cm", 0.0, at_least=0.0, at_most=LARGEST_CM),
+    )
+    columns, rows = len(workspace.columns), len(workspace.rows)
+    grid = f"{workspace.cell_cm:g} gives a grid of {columns} x {rows} nodes"
     if columns * rows > MOST_GRID_NODES:
-        least = ((x[1] - x[0]) * (y[1] - y[0]) / MOST_GRID_NODES) ** 0.5
-        problem = (
-            f"{cell:g} gives a grid of {columns} x {rows} = {columns * rows} nodes, the limit is {MOST_GRID_NODES}; "
-            f"take cells above {least:.3g} centimetres, or a smaller workspace"
-        )
-        table.fail("cell_cm", problem)
+        table.fail("cell_cm", f"{grid}, {MOST_GRID_NODES} are the most; take larger cells or a smaller workspace")
     if min(columns, rows) < 2:
-        table.fail(
-            "cell_cm", f"{cell:g} gives a grid of {columns} x {rows} nodes, 2 x 2 are the least; take smaller cells"
-        )
-    return WorkspaceSpec(x, y, cell, table.number("clearance_cm", 0.0, at_least=0.0, at_most=LARGEST_CM))
+        table.fail("cell_cm", f"{grid}, 2 x 2 are the least; take smaller cells or a larger workspace")
+    return workspace
 
 
 def _obstacle(source: str, path: str, data: object) -> Obstacle:

@@ -6,7 +6,7 @@ Each error names the file, the dotted key with tables counted from 1, the value 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
-from math import isfinite
+from sys import float_info
 from typing import NoReturn, Self, TypeVar
 
 from planarm.errors import SceneError
@@ -195,7 +195,7 @@ class _Limits:
     def allow(self, value: float) -> bool:
         """Tell whether a number is finite and within the limits."""
         return (
-            isfinite(value)
+            abs(value) <= float_info.max  # false for NaN and infinity
             and (self.above is None or value > self.above)
             and (self.at_least is None or value >= self.at_least)
             and (self.at_most is None or value <= self.at_most)

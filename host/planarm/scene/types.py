@@ -1,7 +1,7 @@
 """What a scene says, as frozen dataclasses in centimetres and radians."""
 
 from dataclasses import dataclass
-from math import pi
+from math import ceil, floor, pi
 from typing import Literal
 
 Elbow = Literal["up", "down", "either"]
@@ -36,6 +36,21 @@ class WorkspaceSpec:
     cell_cm: float
     clearance_cm: float
     """Room to keep between the links' edges and the obstacles."""
+
+    @property
+    def columns(self) -> range:
+        """The grid's nodes along x, as multiples of `cell_cm`."""
+        return _multiples_within(self.x_cm, self.cell_cm)
+
+    @property
+    def rows(self) -> range:
+        """The grid's nodes along y, as multiples of `cell_cm`."""
+        return _multiples_within(self.y_cm, self.cell_cm)
+
+
+def _multiples_within(limits_cm: Range, cell_cm: float) -> range:
+    """Return the k with k * cell_cm within the limits; a rounding error beyond an end still counts."""
+    return range(ceil(limits_cm[0] / cell_cm - 1e-9), floor(limits_cm[1] / cell_cm + 1e-9) + 1)
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,7 +6,7 @@ tip in it (`planarm.workspace.proof` has the bound).
 """
 
 from dataclasses import dataclass
-from math import acos, ceil, floor, hypot, sqrt
+from math import acos, hypot, sqrt
 
 import numpy as np
 from numpy.typing import NDArray
@@ -80,8 +80,8 @@ def build_free_map(scene: Scene, margin_cm: float | None = None, elbow: ElbowSid
     """
     world = build_world(scene, margin_cm, elbow)
     cell_cm = scene.workspace.cell_cm
-    x_cm = node_coordinates_cm(scene.workspace.x_cm, cell_cm)
-    y_cm = node_coordinates_cm(scene.workspace.y_cm, cell_cm)
+    x_cm = np.array(scene.workspace.columns, np.float64) * cell_cm
+    y_cm = np.array(scene.workspace.rows, np.float64) * cell_cm
     shape = (len(y_cm), len(x_cm))
     region = np.empty(shape, np.uint8)
     whole = np.empty(shape, np.bool_)
@@ -102,13 +102,6 @@ def build_free_map(scene: Scene, margin_cm: float | None = None, elbow: ElbowSid
         elbow="up" if world.side > 0.0 else "down",
         world=world,
     )
-
-
-def node_coordinates_cm(range_cm: tuple[float, float], cell_cm: float) -> NDArray[np.float64]:
-    """Return the multiples of the cell size within a range, a rounding error beyond its ends included."""
-    first = ceil(range_cm[0] / cell_cm - 1e-9)
-    last = floor(range_cm[1] / cell_cm + 1e-9)
-    return np.arange(first, last + 1, dtype=np.float64) * cell_cm
 
 
 @kernel
