@@ -294,7 +294,7 @@ class Segments:
     TYPE: ClassVar[MessageType] = MessageType.SEGMENTS
 
     segments: tuple[Segment, ...]
-    """One or more, to the payload's end. (segment)"""
+    """In the order of their execution. (segment)"""
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,49 +10,49 @@ from planarm_wire.spec import Code, FieldSpec, Framing, MessageSpec, Spec, Struc
 
 _FRAMING = """\
 ```
-length  seq  type | crc lo  crc hi | payload ... | crc lo  crc hi | 0x{delimiter:02X}
- {header_bytes} header bytes   |  of the header  | length bytes|  of the payload | delimiter
-                  stuffed: all that stands before the delimiter
+length  seq  type  |  crc lo  crc hi  |  payload ...   |  crc lo  crc hi  |  0x{delimiter:02X}
+{header_bytes} header bytes     |  of the header   |  length bytes  |  of the payload  |  delimiter
 ```
 
 {doc}
 
-- **length** is the payload's bytes before stuffing, 0 to {max_payload_bytes}. With length 0 there is neither payload nor
-  payload CRC.
-- **CRC**: {crc}. Its value over the ASCII digits `123456789` is 0x6F91. The header's CRC covers length, seq and type;
-  the payload's CRC continues from the header's CRC value instead of the initial value, and covers the payload.
-- **Stuffing**, after the CRCs are made: each of {special} becomes 0x{escape:02X} followed by the byte xor 0x{escape_xor:02X}.
-- A frame on the line has at most {max_frame_bytes} bytes, delimiter included.
+- **length** counts the payload's bytes before stuffing, 0 to {max_payload}. With length 0 there is neither payload
+  nor payload CRC.
+- **CRC**: {crc}.
+  Its value over the ASCII digits `123456789` is 0x6F91. The header's CRC covers length, seq and type. The payload's
+  CRC covers the payload and continues from the header's CRC value in place of the initial value.
+- **Stuffing**, after the CRCs are made: each of {special} becomes
+  0x{escape:02X} followed by the byte xor 0x{escape_xor:02X}.
+- A frame on the line has at most {max_frame} bytes, delimiter included.
 
-A receiver collects bytes up to a delimiter, drops {reserved} wherever they come, undoes the stuffing, and then checks in
-this order. The first check that fails gives the verdict; the bytes are then forgotten, and the next frame starts after
-the delimiter.
+A receiver collects bytes up to a delimiter, drops {reserved} wherever they come, undoes the stuffing, and then
+checks in this order. The first check that fails gives the verdict; the bytes are then forgotten, and the next frame
+starts after the delimiter.
 
 | # | check | verdict |
-|---|---|---|
+| --- | --- | --- |
 | 1 | every 0x{escape:02X} is followed by the xored form of one of {special} | bad_escape |
 | 2 | at most {most} bytes after unstuffing | too_long |
 | 3 | at least {head} bytes | truncated |
 | 4 | the header's CRC | header_crc |
-| 5 | length is at most {max_payload_bytes}, and no more bytes came than it announces | too_long |
+| 5 | length is at most {max_payload}, and no more bytes came than it announces | too_long |
 | 6 | no fewer bytes came than it announces | truncated |
 | 7 | the payload's CRC, when length is not 0 | payload_crc |
 
-No bytes at all between two delimiters is silence, not an error. The header has a CRC of its own because one CRC-16 over
-everything lets a damaged length pick which bytes are checked."""
+No bytes at all between two delimiters is silence, not an error. The header has a CRC of its own because with one
+CRC-16 over everything a damaged length picks which bytes are checked."""
 
 _TYPES = """\
 All numbers are little-endian.
 
-| type | bytes | range | form |
-|---|---|---|---|
-{rows}
+{table}
 
-- **LEB128**: seven bits a byte, the least significant first; bit 7 is set on every byte but the last. The shortest form
-  is the only one: a form of several bytes that ends in 0x00, a sixth byte, or a value over 32 bits is malformed.
-- **Zigzag** maps an i32 v to the u32 (v << 1) xor (v >> 31), the second shift arithmetic: 0, -1, 1, -2 become 0, 1, 2, 3.
+- **LEB128**: seven bits a byte, the least significant first; bit 7 is set on every byte but the last. The shortest
+  form is the only one: several bytes of which the last is 0x00, a sixth byte, or a value over 32 bits is malformed.
+- **Zigzag** maps an i32 v to the u32 (v << 1) xor (v >> 31), the second shift arithmetic: 0, -1, 1, -2 become
+  0, 1, 2, 3.
 - A payload must end with its last field: bytes left over are malformed, and so are bytes missing.
-- A field with a condition is left out when the condition does not hold, and counts as 0."""
+- A field whose condition does not hold is left out, and counts as 0."""
 
 _STEPS = """\
 For a `move` with N = `steps_dir` >> 1 steps, I = `interval_q16` and A = `add_q16`, step n rises
@@ -60,35 +60,37 @@ For a `move` with N = `steps_dir` >> 1 steps, I = `interval_q16` and A = `add_q1
     T_n = first_ticks + floor((n I + n (n - 1) / 2 A) / 2^16)        n = 0 .. N - 1
 
 ticks after the start of its segment, computed in exact integers (64 bits are enough; floor rounds towards minus
-infinity). So each interval is A / 2^16 ticks longer than the one before it. The first segment of a motion starts
-`lead_ticks` after START is carried out, and every other one where the segment before it ends: B_(k+1) = B_k + duration.
+infinity). So the interval from step n to step n + 1 is I + n A, in 2^-16 ticks. The first segment of a motion starts
+`lead_ticks` after START is carried out, and every other one where the segment before it ends:
+B_(k+1) = B_k + duration.
 
 A segment is good when all of this holds for each joint; anything else latches `bad_segment`:
 
 - 1 <= duration <= {max_segment_ticks}, N <= {max_segment_steps}, and T_n < duration for every n;
-- the steps come in order, at least {min_interval_ticks} ticks apart, across a segment's boundary too;
-- inside a run of two or more steps, no interval is over {max_interval_ticks} ticks.
+- {min_interval_ticks} x 2^16 <= I + n A <= {max_interval_ticks} x 2^16 for n = 0 .. N - 2;
+- its first step comes at least {min_interval_ticks} ticks after the joint's last step in the segments before.
 
-A pulse is high for at least {min_step_high_ticks} and low for at least {min_step_low_ticks} ticks. A direction pin changes at least
-{min_dir_setup_ticks} ticks before the next step rises."""
+A pulse is high for at least {min_step_high_ticks} ticks and low for at least {min_step_low_ticks} ticks. A direction
+pin changes at least {min_dir_setup_ticks} ticks before the next step rises."""
 
 _HASH = """\
-WELCOME carries `spec_hash` = 0x{spec_hash:08X} for this page: take `messages.toml` as parsed, drop every string under the
-keys `doc`, `text` and `fix`, write it as JSON with sorted keys, no spaces and ASCII only, and read the first four bytes
-of its SHA-256 as a little-endian u32. A better wording leaves it as it is; everything else changes it. A host refuses a
-device whose `protocol_version` differs, and one whose `spec_hash` differs too: flash the image that was released with
-the host."""
+WELCOME carries `spec_hash` = 0x{spec_hash:08X} for this page: take `messages.toml` as parsed, drop every string under
+the keys `doc`, `text` and `fix`, write it as JSON with sorted keys, no spaces and ASCII only, and read the first four
+bytes of its SHA-256 as a little-endian u32. A better wording leaves it as it is; everything else changes it. A host
+refuses a device whose `protocol_version` differs, and one whose `spec_hash` differs too: flash the image that was
+released with the host."""
 
 _VECTORS = """\
-`protocol/vectors.json` holds frames of every message, damaged streams with the receiver's verdicts, payloads that must be
-refused, and segments with the ticks of all their steps. An implementation of either end must agree with all of them."""
+`protocol/vectors.json` holds frames of every message, damaged streams with the receiver's verdicts, payloads that
+must be refused, and segments with the ticks of all their steps. An implementation of either end must agree with all
+of them."""
 
 
 def protocol_md(spec: Spec) -> str:
     """Return the text of docs/protocol.md."""
     sections = {
         "Frames": _framing(spec.framing),
-        "Sequence": _paragraphs(spec.sequence_doc),
+        "Sequence": spec.sequence_doc.strip(),
         "Types": _types(),
         "Messages": "\n\n".join(_message(message) for message in spec.messages),
         "Structs": "\n\n".join(_struct(struct) for struct in spec.structs),
@@ -109,18 +111,17 @@ def protocol_md(spec: Spec) -> str:
 
 
 def _framing(framing: Framing) -> str:
-    special = _hex_list((framing.delimiter, framing.escape, *framing.reserved))
     head = framing.header_bytes + framing.crc_bytes
     return _FRAMING.format(
         delimiter=framing.delimiter,
         escape=framing.escape,
         escape_xor=framing.escape_xor,
         header_bytes=framing.header_bytes,
-        max_payload_bytes=framing.max_payload_bytes,
-        max_frame_bytes=framing.max_frame_bytes,
-        doc=_paragraphs(framing.doc),
+        max_payload=framing.max_payload_bytes,
+        max_frame=framing.max_frame_bytes,
+        doc=framing.doc.strip(),
         crc=framing.crc,
-        special=special,
+        special=_hex_list((framing.delimiter, framing.escape, *framing.reserved)),
         reserved=_hex_list(framing.reserved),
         head=head,
         most=head + framing.max_payload_bytes + framing.crc_bytes,
@@ -131,20 +132,18 @@ def _hex_list(codes: Iterable[int]) -> str:
     return ", ".join(f"0x{code:02X}" for code in codes)
 
 
-def _paragraphs(text: str) -> str:
-    """Return a text of the specification as it is wrapped there."""
-    return text.strip()
-
-
 def _types() -> str:
     forms = {"varuint": "LEB128", "varint": "zigzag, then LEB128"}
     rows = (
-        f"| {name} | {byte_range(scalar.min_bytes, scalar.max_bytes).split(' byte')[0]} "
-        f"| {scalar.minimum:,} .. {scalar.maximum:,} "
-        f"| {forms.get(name, 'two’s complement' if scalar.signed else 'binary')} |"
+        (
+            name,
+            byte_range(scalar.min_bytes, scalar.max_bytes).removesuffix("s").removesuffix(" byte"),
+            f"{scalar.minimum:,} .. {scalar.maximum:,}",
+            forms.get(name, "two's complement" if scalar.signed else "binary"),
+        )
         for name, scalar in SCALARS.items()
     )
-    return _TYPES.format(rows="\n".join(rows))
+    return _TYPES.format(table=_table(("type", "bytes", "range", "form"), rows))
 
 
 def _message(message: MessageSpec) -> str:

@@ -30,7 +30,7 @@ _SEGMENTS: Final[tuple[m.Segment, ...]] = (
     m.Segment(2 * 16_000, (_RAMP_UP, _RAMP_DOWN)),
     m.Segment(2 * 4_000, (m.Move(2 * 4 + 1, 0, 800 << 16, 0), m.Move(2 * 2, 1, (1294 << 16) + 0xFFFF, 0))),
     # A fraction of a tick: the floor of a falling sum, and a sum that passes 32 bits.
-    m.Segment(2 * 400_000 + 1, (m.Move(2 * 40, 7, (9_000 << 16) + 5, -13), m.Move(2 * 7 + 1, 3, 60_000 << 16, 1))),
+    m.Segment(2 * 400_000 + 1, (m.Move(2 * 40, 7, (9_000 << 16) + 5, -13), m.Move(2 * 7 + 1, 3, 59_999 << 16, 1))),
     m.Segment(2 * 12_000_000, (m.Move(2 * 300 + 1, 799, 39_900 << 16, -0x123456), m.Move(2, 11_999_999))),
 )
 
