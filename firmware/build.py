@@ -1,0 +1,224 @@
+"""Builds the firmware, directly and through PlatformIO, and keeps the released image.
+
+    python firmware/build.py avr [--out DIR]   hex and elf by avr-gcc
+    python firmware/build.py pio               the same through `pio run`, without PlatformIO's registry
+    python firmware/build.py native            the core as a shared library for this computer, for tests
+    python firmware/build.py release           writes release/uno.hex and release/uno.json
+    python firmware/build.py check             proves that both builds equal release/uno.hex, byte for byte
+
+Sources and flags are those of platformio.ini, in PlatformIO's order, so that both builds agree. Nothing in an image
+depends on the time or the place of its build. Needs the standard library only; exits 1 with the reason on failure.
+"""
+
+from __future__ import annotations
+
+import argparse
+import configparser
+import hashlib
+import json
+import os
+import re
+import shutil
+import subprocess
+import sys
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+FIRMWARE = Path(__file__).resolve().parent
+RELEASE_HEX = FIRMWARE / "release" / "uno.hex"
+RELEASE_JSON = FIRMWARE / "release" / "uno.json"
+BUILD = FIRMWARE / "build"
+
+# What PlatformIO's platform adds to the flags of platformio.ini.
+PLATFORM_COMPILE = ("-mmcu=atmega328p", "-DF_CPU=16000000L")
+PLATFORM_LINK = ("-mmcu=atmega328p",)
+
+PIO_TIMEOUT_S = 50  # a package that is missing is asked for over and over; the store below has them all
+NATIVE_FLAGS = ("-O1", "-g", "-fPIC", "-fsanitize=undefined", "-fno-sanitize-recover=all")
+
+
+class BuildError(Exception):
+    """A build step failed; the message says which and why."""
+
+
+@dataclass(frozen=True, slots=True)
+class Release:
+    """What release/uno.json tells of release/uno.hex."""
+
+    sha256: str
+    flash_bytes: int
+    sram_bytes: int
+    compiler: str
+    spec_hash: str
+
+
+def run(command: list[str], timeout_s: float | None = None, **environment: str) -> str:
+    """Run a command in the firmware folder and return its output. Raises BuildError with its words if it fails."""
+    try:
+        done = subprocess.run(
+            command,
+            cwd=FIRMWARE,
+            env=os.environ | environment,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+            timeout=timeout_s,
+            check=False,
+        )
+    except FileNotFoundError as error:
+        raise BuildError(f"{command[0]} is not installed or not on PATH") from error
+    except subprocess.TimeoutExpired as error:
+        raise BuildError(f"{' '.join(command)}: no end after {timeout_s:.0f} s") from error
+    if done.returncode != 0:
+        raise BuildError(f"{' '.join(command)}: exit code {done.returncode}\n{done.stdout}")
+    return done.stdout
+
+
+def read_settings(environment: str) -> tuple[list[str], list[Path]]:
+    """Return the build flags and the sources, in link order, of one environment of platformio.ini."""
+    ini = configparser.ConfigParser(interpolation=None)
+    ini.read(FIRMWARE / "platformio.ini", encoding="utf-8")
+    section = ini[f"env:{environment}"]
+    flags = section["build_flags"].replace("${env.build_flags}", ini["env"]["build_flags"])
+    patterns = re.findall(r"\+<([^>]+)>", section["build_src_filter"])
+    sources = sorted(path.relative_to(FIRMWARE) for pattern in patterns for path in FIRMWARE.glob(pattern))
+    return " ".join(flags.splitlines()).replace("-I ", "-I").split(), sources
+
+
+def build_avr(out: Path) -> Path:
+    """Build uno.elf and uno.hex in `out` by avr-gcc; return the hex."""
+    flags, sources = read_settings("uno")
+    compile_flags = [flag for flag in flags if not flag.startswith("-Wl,")]
+    link_flags = [flag for flag in flags if flag.startswith("-Wl,")]
+    objects = []
+    for source in sources:
+        target = out / "uno" / source.with_suffix(".o")
+        target.parent.mkdir(parents=True, exist_ok=True)
+        run(["avr-g++", "-c", *PLATFORM_COMPILE, *compile_flags, "-o", str(target), str(source)])
+        objects.append(str(target))
+    elf, image = out / "uno.elf", out / "uno.hex"
+    run(["avr-g++", *PLATFORM_LINK, *link_flags, "-o", str(elf), *objects])
+    run(["avr-objcopy", "-O", "ihex", "-R", ".eeprom", str(elf), str(image)])
+    return image
+
+
+def find_pio() -> str:
+    """Return PlatformIO's program: beside this Python, or on PATH."""
+    beside = Path(sys.executable).with_name("pio")
+    found = str(beside) if beside.exists() else shutil.which("pio")
+    if found is None:
+        raise BuildError("pio is not installed: pip install platformio==6.2.0 scons==4.11.1")
+    return found
+
+
+def run_pio(*arguments: str) -> str:
+    """Run PlatformIO on this project with the stand-in store of offline/ instead of its registry."""
+    offline = FIRMWARE / "offline"
+    return run(
+        [find_pio(), *arguments],
+        timeout_s=PIO_TIMEOUT_S,
+        PLATFORMIO_CORE_DIR=str(BUILD / "pio-core"),
+        PLATFORMIO_WORKSPACE_DIR=str(BUILD / "pio"),
+        PLATFORMIO_PLATFORMS_DIR=str(offline / "platforms"),
+        PLATFORMIO_PACKAGES_DIR=str(offline / "packages"),
+        PLATFORMIO_SETTING_ENABLE_TELEMETRY="No",
+        PLATFORMIO_DISABLE_UPGRADE_CHECK="true",
+        PYTHONDONTWRITEBYTECODE="1",
+    )
+
+
+def build_pio() -> Path:
+    """Build with `pio run`; return the hex."""
+    run_pio("run", "-d", str(FIRMWARE), "-e", "uno")
+    return BUILD / "pio" / "build" / "uno" / "program.hex"
+
+
+def build_native(out: Path) -> Path:
+    """Build the core with its hardware layer for this computer as a shared library; return it."""
+    flags, sources = read_settings("native")
+    kept = [flag for flag in flags if not flag.startswith(("-fsanitize", "-fno-sanitize", "-O", "-g"))]
+    out.mkdir(parents=True, exist_ok=True)
+    library = out / "libplanarm_firmware.so"
+    run(["g++", "-shared", *kept, *NATIVE_FLAGS, "-o", str(library), *map(str, sources)])
+    return library
+
+
+def compiler_version() -> str:
+    """Return avr-gcc's first line, such as `avr-gcc (GCC) 5.4.0`."""
+    return run(["avr-gcc", "--version"]).splitlines()[0]
+
+
+def describe(image: Path) -> Release:
+    """Measure a freshly built image whose elf lies beside it."""
+    sections = re.findall(r"^\.(\w+)\s+(\d+)\s", run(["avr-size", "-A", str(image.with_suffix(".elf"))]), re.M)
+    size = {name: int(count) for name, count in sections}
+    header = (FIRMWARE / "core" / "messages.h").read_text(encoding="utf-8")
+    spec_hash = re.search(r"SPEC_HASH = 0x([0-9A-F]+)", header)
+    if spec_hash is None:
+        raise BuildError("core/messages.h: no SPEC_HASH; run python -m planarm_wire.generate")
+    return Release(
+        sha256=hashlib.sha256(image.read_bytes()).hexdigest(),
+        flash_bytes=size["text"] + size["data"],
+        sram_bytes=size["data"] + size["bss"] + size.get("noinit", 0),
+        compiler=compiler_version(),
+        spec_hash=spec_hash.group(1).lower(),
+    )
+
+
+def release() -> None:
+    """Build and write the released image with its description."""
+    image = build_avr(BUILD)
+    RELEASE_HEX.parent.mkdir(exist_ok=True)
+    RELEASE_HEX.write_bytes(image.read_bytes())
+    RELEASE_JSON.write_text(json.dumps(asdict(describe(image)), indent=2) + "\n", encoding="utf-8")
+
+
+def require_released(image: Path, how: str) -> None:
+    """Raise BuildError unless an image equals the released one."""
+    if image.read_bytes() == RELEASE_HEX.read_bytes():
+        return
+    told = json.loads(RELEASE_JSON.read_text(encoding="utf-8"))["compiler"]
+    here = compiler_version()
+    reason = (
+        "the sources changed after the release: run firmware/build.py release"
+        if told == here
+        else f"the release was built with {told}, here is {here}"
+    )
+    raise BuildError(f"{how}: {image} differs from {RELEASE_HEX}; {reason}")
+
+
+def check() -> None:
+    """Prove that both builds give the released image, and that its description is true."""
+    image = build_avr(BUILD)
+    require_released(image, "avr-gcc")
+    told = Release(**json.loads(RELEASE_JSON.read_text(encoding="utf-8")))
+    if told != describe(image):
+        raise BuildError(f"{RELEASE_JSON} says {told}, measured {describe(image)}; run firmware/build.py release")
+    require_released(build_pio(), "pio run")
+
+
+def main() -> int:
+    """Carry out one command; return the exit code."""
+    parser = argparse.ArgumentParser(description="Builds planarm's firmware.")
+    parser.add_argument("command", choices=("avr", "pio", "native", "release", "check"))
+    parser.add_argument("--out", type=Path, default=BUILD, help="folder for the results of avr and native")
+    arguments = parser.parse_args()
+    out = arguments.out.resolve()
+    commands = {
+        "avr": lambda: build_avr(out),
+        "pio": build_pio,
+        "native": lambda: build_native(out),
+        "release": release,
+        "check": check,
+    }
+    try:
+        result = commands[arguments.command]()
+    except BuildError as error:
+        print(f"firmware/build.py {arguments.command}: {error}", file=sys.stderr)
+        return 1
+    print(result or f"{RELEASE_HEX}: ok")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,17 @@
+// The 32-bit tick clock: the timer's 16 bits, carried on by the main program. It wraps after 268 s; times are compared by
+// their difference, as int32_t.
+#pragma once
+
+#include <stdint.h>
+
+namespace planarm {
+namespace clock {
+
+// The 32-bit time of a reading of the timer. Right as long as one is made in every 65,536 ticks (4.1 ms).
+uint32_t extend(uint16_t counter);
+
+// Ticks now.
+uint32_t now();
+
+}  // namespace clock
+}  // namespace planarm

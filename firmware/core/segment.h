@@ -1,0 +1,46 @@
+// A segment as the queue holds it, and the rules it must keep.
+#pragma once
+
+#include <stdint.h>
+
+#include "messages.h"
+#include "reader.h"
+
+namespace planarm {
+
+// One joint's steps in a segment: step n rises first_ticks + floor((n I + n (n - 1) / 2 A) / 2^16) ticks after its start.
+struct Move {
+    uint32_t first_ticks;
+    uint32_t interval_q16;
+    int32_t add_q16;
+    uint16_t steps;
+    bool positive : 1;
+    bool near : 1;  // close enough to the joint's step before for the step interrupt to go on by itself
+};
+
+struct Segment {
+    uint32_t duration_ticks;
+    bool last;
+    Move moves[wire::JOINTS];
+};
+
+// Time from each joint's last queued step to the end of the queue, saturated; a joint that has not moved yet counts as
+// resting for ever.
+struct Rest {
+    static constexpr uint32_t FOREVER = 0xFFFFFFFF;
+    uint32_t ticks[wire::JOINTS] = {FOREVER, FOREVER};
+};
+
+// Longest wait for which a compare register may be set ahead: the 16-bit timer must still tell early from late.
+constexpr uint16_t MAX_AHEAD_TICKS = wire::MAX_INTERVAL_TICKS;
+
+// Ticks from the first to the last step of a move whose intervals are in their limits. At most 2^31.
+uint32_t run_ticks(const Move& move);
+
+// Reads the fields of the next segment; `near` is left for check_segment.
+Segment read_segment(Reader& reader);
+
+// Checks a segment that follows after `rest`, and carries `rest` on to its end. OK or OUT_OF_RANGE.
+wire::Result check_segment(Segment& segment, Rest& rest);
+
+}  // namespace planarm

@@ -1,0 +1,24 @@
+// USART0 at the wire's baud rate, 8N1: a receive ring and one reply at a time.
+#pragma once
+
+#include <stdint.h>
+
+namespace hal {
+
+// Switches the USART on. Interrupts are still off.
+void serial_init();
+
+// Takes the oldest received byte; false when there is none.
+bool serial_read(uint8_t& byte);
+
+// True when no reply is being sent.
+bool serial_can_send();
+
+// Sends `size` bytes (at least one), which must stay in place meanwhile.
+void serial_send(const uint8_t* bytes, uint8_t size);
+
+// Bytes lost in the USART, and bytes lost because the ring was full; both modulo 256.
+uint8_t serial_overruns();
+uint8_t serial_ring_full();
+
+}  // namespace hal

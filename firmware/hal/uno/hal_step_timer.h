@@ -1,0 +1,122 @@
+// Timer1 of the ATmega328P, free-running at the CPU clock, and the pins that it steps: joint 0 on OC1A (D9), joint 1 on
+// OC1B (D10). ATmega328P datasheet, section 15.
+//
+// A channel's compare output is in one of two modes. Armed: the pin rises at the match. Disarmed: the pin falls at the
+// match, so a match means nothing to a low pin. Falling is a forced compare in the disarmed mode.
+#pragma once
+
+#include <avr/interrupt.h>
+#include <avr/io.h>
+#include <stdint.h>
+
+// The step interrupts must hold no calls.
+#define HAL_INLINE inline __attribute__((always_inline))
+
+namespace hal {
+
+// Holds interrupts off while it lives.
+class InterruptLock {
+  public:
+    InterruptLock() : saved_(SREG) { cli(); }
+    ~InterruptLock() {
+        compiler_fence();
+        SREG = saved_;
+    }
+    InterruptLock(const InterruptLock&) = delete;
+    InterruptLock& operator=(const InterruptLock&) = delete;
+
+  private:
+    static void compiler_fence() { __asm__ __volatile__("" ::: "memory"); }
+
+    uint8_t saved_;
+};
+
+HAL_INLINE void compiler_barrier() { __asm__ __volatile__("" ::: "memory"); }
+
+// Starts the timer with both channels disarmed. The counter starts at 0.
+inline void step_timer_init() {
+    TCCR1A = _BV(COM1A1) | _BV(COM1B1);
+    TCNT1 = 0;
+    TCCR1B = _BV(CS10);
+}
+
+// The timer's 16 bits. Interrupts must be off: they share the timer's TEMP register.
+HAL_INLINE uint16_t counter() { return TCNT1; }
+
+template <uint8_t JOINT>
+HAL_INLINE uint16_t step_edge() {
+    return JOINT == 0 ? OCR1A : OCR1B;
+}
+
+// Sets the tick of the next match. Interrupts must be off.
+template <uint8_t JOINT>
+HAL_INLINE void step_set_edge(uint16_t tick) {
+    if (JOINT == 0) {
+        OCR1A = tick;
+    } else {
+        OCR1B = tick;
+    }
+}
+
+template <uint8_t JOINT>
+HAL_INLINE void step_arm() {
+    TCCR1A = static_cast<uint8_t>(TCCR1A | (JOINT == 0 ? _BV(COM1A0) : _BV(COM1B0)));
+}
+
+// Disarms the channel and takes the pin low.
+template <uint8_t JOINT>
+HAL_INLINE void step_fall() {
+    TCCR1A = static_cast<uint8_t>(TCCR1A & ~(JOINT == 0 ? _BV(COM1A0) : _BV(COM1B0)));
+    TCCR1C = JOINT == 0 ? _BV(FOC1A) : _BV(FOC1B);
+}
+
+template <uint8_t JOINT>
+HAL_INLINE bool step_is_high() {
+    return (PINB & (JOINT == 0 ? _BV(PINB1) : _BV(PINB2))) != 0;
+}
+
+// Forgets a match that nobody waited for.
+template <uint8_t JOINT>
+HAL_INLINE void step_forget_match() {
+    TIFR1 = JOINT == 0 ? _BV(OCF1A) : _BV(OCF1B);
+}
+
+template <uint8_t JOINT>
+HAL_INLINE void step_interrupt_on() {
+    TIMSK1 = static_cast<uint8_t>(TIMSK1 | (JOINT == 0 ? _BV(OCIE1A) : _BV(OCIE1B)));
+}
+
+template <uint8_t JOINT>
+HAL_INLINE void step_interrupt_off() {
+    TIMSK1 = static_cast<uint8_t>(TIMSK1 & ~(JOINT == 0 ? _BV(OCIE1A) : _BV(OCIE1B)));
+}
+
+template <uint8_t JOINT>
+HAL_INLINE bool step_interrupt_is_on() {
+    return (TIMSK1 & (JOINT == 0 ? _BV(OCIE1A) : _BV(OCIE1B))) != 0;
+}
+
+// Disarms both channels and stops their interrupts; a pin that is high stays high.
+HAL_INLINE void steps_off() {
+    TCCR1A = _BV(COM1A1) | _BV(COM1B1);
+    TIMSK1 = 0;
+}
+
+// Passes the least high time of a pulse that may have risen just now: 11 turns of 3 cycles.
+inline void wait_step_high() {
+    uint8_t turns = 11;
+    __asm__ __volatile__("1: dec %0\n\tbrne 1b" : "+r"(turns));
+}
+
+// DIR is D4 for joint 0 and D5 for joint 1; one instruction, so no lock is needed.
+template <uint8_t JOINT>
+HAL_INLINE void dir_write(bool positive) {
+    constexpr uint8_t mask = JOINT == 0 ? _BV(PORTD4) : _BV(PORTD5);
+    if (positive) {
+        PORTD |= mask;
+    } else {
+        PORTD &= static_cast<uint8_t>(~mask);
+    }
+}
+
+}  // namespace hal
