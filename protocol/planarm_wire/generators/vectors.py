@@ -22,6 +22,7 @@ _STUFFED_U32: Final = 0x7B7C7D7E  # every byte must be escaped
 _REST: Final = m.Move(0)
 _RAMP_UP: Final = m.Move(2 * 5 + 1, 100, 2000 << 16, -(100 << 16))
 _RAMP_DOWN: Final = m.Move(2 * 4, 0, (1000 << 16) + 1, 0x8001)
+_ALL_STUFFED: Final = m.Move(0x7D, 0x7C, 0x7B, 0x3E)  # the last is 0x7C after zigzag
 _EXTREME: Final = m.Move(2 * m.MAX_SEGMENT_STEPS + 1, m.MAX_SEGMENT_TICKS, m.MAX_INTERVAL_TICKS << 16, -(2**31))
 
 _SEGMENTS: Final[tuple[m.Segment, ...]] = (
@@ -44,6 +45,7 @@ _MESSAGES: Final[tuple[m.Message, ...]] = (
     *(m.Segments((segment,)) for segment in _SEGMENTS),
     m.Segments((_SEGMENTS[0],) * 9),
     m.Segments((m.Segment(2 * m.MAX_SEGMENT_TICKS + 1, (_EXTREME, _EXTREME)),)),
+    m.Segments((m.Segment(0x7E, (_ALL_STUFFED, _ALL_STUFFED)),) * 5),
     m.Start(m.MIN_LEAD_TICKS),
     m.Start(0xFFFFFFFF),
     m.Clear(),
