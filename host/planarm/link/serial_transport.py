@@ -1,0 +1,133 @@
+"""Serial ports, ptys and everything else that pyserial opens, with errors that say what to do."""
+
+import contextlib
+import errno
+import os
+import select
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import serial
+import serial.tools.list_ports
+
+from planarm.errors import LinkError
+from planarm.link.clock import Clock, RealClock
+
+WRITE_TIMEOUT_S = 1.0  # 25,000 bytes at 250,000 baud; more than ever waits to be sent
+_SLICE_S = 0.005  # how late a deadline may be noticed on lines that select() does not know
+
+
+class SerialTransport:
+    """A line opened by pyserial, held exclusively, on the computer's clock."""
+
+    pins = None
+
+    def __init__(self, url: str, baud: int) -> None:
+        self.url = url
+        self.clock: Clock = RealClock()
+        self._port = _open(url, baud)
+        self._descriptor = _descriptor(self._port)
+        if self._descriptor is not None:
+            self._port.timeout = 0
+            _lock(self._descriptor)
+
+    def read(self, max_bytes: int, deadline_s: float) -> bytes:
+        """Return what has arrived, waiting until `deadline_s` for the first byte."""
+        with self._translated("read"):
+            while True:
+                remaining_s = deadline_s - self.clock.now_s()
+                data = self._receive(max_bytes, max(remaining_s, 0.0))
+                if data or remaining_s <= 0.0:
+                    return data
+
+    def write(self, data: bytes) -> None:
+        """Write all of `data`; LinkError when the line does not take it within WRITE_TIMEOUT_S."""
+        with self._translated("write"):
+            self._port.write(data)
+
+    def close(self) -> None:
+        """Close the port and give up its lock."""
+        self._port.close()
+
+    def _receive(self, max_bytes: int, wait_s: float) -> bytes:
+        if self._descriptor is not None:
+            if self._port.is_open:
+                select.select([self._descriptor], [], [], None if wait_s == float("inf") else wait_s)
+            return bytes(self._port.read(max_bytes))
+        first = bytes(self._port.read(1))
+        return first + bytes(self._port.read(min(max_bytes - 1, self._port.in_waiting))) if first else b""
+
+    @contextlib.contextmanager
+    def _translated(self, action: str) -> Iterator[None]:
+        try:
+            yield
+        except serial.PortNotOpenError as error:
+            raise LinkError(f"port {self.url}: {action} after it was closed") from error
+        except serial.SerialTimeoutException as error:
+            raise LinkError(
+                f"port {self.url}: it took no bytes for {WRITE_TIMEOUT_S:g} s; check that the other end is alive"
+            ) from error
+        except (serial.SerialException, OSError) as error:
+            raise LinkError(
+                f"port {self.url}: the line is gone ({error}); was the cable pulled, or is another program on the port?"
+            ) from error
+
+
+def _open(url: str, baud: int) -> serial.SerialBase:
+    try:
+        return serial.serial_for_url(
+            url,
+            baudrate=baud,
+            timeout=_SLICE_S,
+            write_timeout=WRITE_TIMEOUT_S,
+            exclusive=True if os.name == "posix" and "://" not in url else None,
+        )
+    except (serial.SerialException, OSError, ValueError) as error:
+        raise LinkError(_why_not_opened(url, baud, error)) from error
+
+
+def _why_not_opened(url: str, baud: int, error: Exception) -> str:
+    code = getattr(error, "errno", None)
+    if code in (errno.ENOENT, errno.ENODEV, errno.ENXIO):
+        found = ", ".join(port.device for port in serial.tools.list_ports.comports()) or "none"
+        return f"port {url}: not found; serial ports found here: {found}"
+    if code in (errno.EACCES, errno.EPERM):
+        return f"port {url}: permission denied; {_how_to_get_permission(url)}"
+    if code in (errno.EBUSY, errno.EAGAIN, errno.EWOULDBLOCK):
+        return f"port {url}: in use by another program; close that program first"
+    return f"port {url}: cannot be opened at {baud} baud ({error})"
+
+
+def _how_to_get_permission(path: str) -> str:
+    if sys.platform == "win32":
+        return "another program may hold the port"
+    import grp  # noqa: PLC0415 - POSIX only
+
+    try:
+        group_id = Path(path).stat().st_gid
+        group = grp.getgrgid(group_id).gr_name
+    except OSError:
+        return "the folder of the port cannot be read"
+    except KeyError:
+        group = f"group {group_id}"
+    return f"join the group {group} (sudo usermod -aG {group} $USER) and log in again"
+
+
+def _descriptor(port: serial.SerialBase) -> int | None:
+    """File descriptor that select() can wait on, or None."""
+    if os.name != "posix":
+        return None
+    try:
+        return int(port.fileno())
+    except OSError:  # io.UnsupportedOperation: loop:// and rfc2217:// have none
+        return None
+
+
+def _lock(descriptor: int) -> None:
+    """Keep out openers that do not ask for pyserial's advisory lock, where the line is a terminal (TIOCEXCL)."""
+    import fcntl  # noqa: PLC0415 - POSIX only
+    import termios  # noqa: PLC0415
+
+    if os.isatty(descriptor):
+        fcntl.ioctl(descriptor, termios.TIOCEXCL)

@@ -1,0 +1,103 @@
+"""The emulated Uno in this process, as a transport in virtual time. The one place in the host that knows the emulator.
+
+Time passes for the emulator only while the host waits for it: `read` runs the chip in slices until a byte has come out
+or the deadline is reached, so a run is deterministic and as fast as the emulator computes. `Uno.serial` paces bytes at
+the baud rate in both directions, ten bits a byte.
+"""
+
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from planarm_wire.messages import BAUD, TICKS_HZ
+
+from planarm.errors import LinkError
+from planarm.link.clock import Clock
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+    from planarm_sim import Uno
+
+SLICE_CYCLES = 1600  # a reply is noticed at most 100 us, or 2.5 bytes at 250,000 baud, after it came
+
+
+class EmulatorClock:
+    """The emulated board's time; waiting runs the board."""
+
+    def __init__(self, uno: "Uno") -> None:
+        self._uno = uno
+
+    def now_s(self) -> float:
+        """Emulated seconds since power-up."""
+        return self._uno.cycle / TICKS_HZ
+
+    def wait_until(self, t_s: float) -> None:
+        """Run the board until its time is `t_s`."""
+        _run(self._uno, _first_cycle(t_s))
+
+
+class SimTransport:
+    """A line to an Uno emulated from a flash image; `pins` shows its edges."""
+
+    def __init__(self, image: str | Path, baud: int = BAUD) -> None:
+        from planarm_sim import SimError, Uno  # noqa: PLC0415 - brings Numba, which only emulation needs
+
+        try:
+            self._uno = Uno.from_hex(image, baud=baud)
+        except (SimError, OSError) as error:
+            raise LinkError(f"port sim://: {error}") from error
+        self.clock: Clock = EmulatorClock(self._uno)
+        self.pins = EmulatorPins(self._uno)
+        self._received = bytearray()
+        self._open = True
+
+    def read(self, max_bytes: int, deadline_s: float) -> bytes:
+        """Run the board until it has sent a byte or its time is `deadline_s`; return at most `max_bytes` bytes."""
+        self._check_open("read")
+        uno = self._uno
+        self._received += uno.serial.read()
+        while not self._received and uno.cycle / TICKS_HZ < deadline_s:
+            _run(uno, min(uno.cycle + SLICE_CYCLES, _first_cycle(deadline_s)))
+            self._received += uno.serial.read()
+        data = bytes(self._received[:max_bytes])
+        del self._received[:max_bytes]
+        return data
+
+    def write(self, data: bytes) -> None:
+        """Put `data` on the line; it reaches the chip byte by byte as time passes."""
+        self._check_open("write")
+        self._uno.serial.write(data)
+
+    def close(self) -> None:
+        """Stop using the board; its pins stay readable."""
+        self._open = False
+
+    def _check_open(self, action: str) -> None:
+        if not self._open:
+            raise LinkError(f"port sim://: {action} after it was closed")
+
+
+class EmulatorPins:
+    """The emulated board's pins."""
+
+    def __init__(self, uno: "Uno") -> None:
+        self._uno = uno
+
+    def edges(self, pin: str) -> "NDArray[Any]":
+        """Edges of `pin` since power-up, as a structured array (cycle int64, level uint8)."""
+        return self._uno.edges(pin)
+
+
+def _first_cycle(t_s: float) -> float:
+    """First clock cycle at or after `t_s`; infinity stays infinity."""
+    return math.ceil(t_s * TICKS_HZ) if math.isfinite(t_s) else t_s
+
+
+def _run(uno: "Uno", cycle: float) -> None:
+    """Run to `cycle`; an instruction may end a little later."""
+    from planarm_sim import SimError  # noqa: PLC0415
+
+    try:
+        uno.run(cycles=max(0, int(cycle) - uno.cycle))
+    except SimError as error:
+        raise LinkError(f"port sim://: {error}") from error

@@ -1,0 +1,86 @@
+"""Transports: bytes to and from a device, chosen by URL.
+
+==============================  =====================================================================
+``sim://``                      the emulated Uno in this process, in virtual time, with the released image
+``sim://?image=PATH``           the same with another flash image (Intel HEX)
+``/dev/ttyACM0``, ``COM3``      a serial port or a pty
+``socket://host:port`` and      whatever pyserial opens by URL
+``rfc2217://``, ``loop://`` ..
+==============================  =====================================================================
+"""
+
+from typing import TYPE_CHECKING, Any, Protocol
+from urllib.parse import parse_qs, urlsplit
+
+from planarm_wire.messages import BAUD
+
+from planarm.errors import LinkError
+from planarm.link.clock import Clock
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+SIM_SCHEME = "sim"
+PYSERIAL_SCHEMES = ("alt", "cp2110", "hwgrep", "loop", "rfc2217", "socket", "spy")
+
+
+class PinTrace(Protocol):
+    """What a transport to an emulated board shows beside its bytes: the edges on the board's pins."""
+
+    def edges(self, pin: str) -> "NDArray[Any]":
+        """Edges of one pin, such as "D9", as a structured array (cycle int64 at 16 MHz, level uint8)."""
+        ...
+
+
+class Transport(Protocol):
+    """A two-way byte line with a clock of its own."""
+
+    @property
+    def clock(self) -> Clock:
+        """The clock that deadlines refer to: the computer's, or the emulator's virtual one."""
+        ...
+
+    @property
+    def pins(self) -> PinTrace | None:
+        """The board's pins when it is an emulated one, else None."""
+        ...
+
+    def read(self, max_bytes: int, deadline_s: float) -> bytes:
+        """Return 1 to `max_bytes` bytes as soon as there are any, or b"" once the clock shows `deadline_s`.
+
+        A deadline in the past reads what is there. LinkError when the line is gone.
+        """
+        ...
+
+    def write(self, data: bytes) -> None:
+        """Hand all of `data` to the line, in order; LinkError when it is gone or does not take it."""
+        ...
+
+    def close(self) -> None:
+        """Give the line back; closing twice is fine, reading or writing afterwards is a LinkError."""
+        ...
+
+
+def open_transport(url: str, baud: int = BAUD) -> Transport:
+    """Open the line that `url` names, at `baud` where that has a meaning; LinkError tells why it cannot be opened."""
+    scheme, separator, _ = url.partition("://")
+    if not separator or scheme.lower() in PYSERIAL_SCHEMES:
+        from planarm.link.serial_transport import SerialTransport  # noqa: PLC0415 - pyserial only where it is used
+
+        return SerialTransport(url, baud)
+    if scheme.lower() == SIM_SCHEME:
+        return _open_emulator(url, baud)
+    known = ", ".join(f"{name}://" for name in (SIM_SCHEME, *PYSERIAL_SCHEMES))
+    raise LinkError(f"port {url!r}: unknown scheme {scheme!r}; give a device path or one of {known}")
+
+
+def _open_emulator(url: str, baud: int) -> Transport:
+    from planarm.link.released_image import released_image  # noqa: PLC0415
+    from planarm.link.sim_transport import SimTransport  # noqa: PLC0415 - the emulator only where it is used
+
+    parts = urlsplit(url)
+    options = parse_qs(parts.query, keep_blank_values=True)
+    if parts.netloc or parts.path or set(options) - {"image"}:
+        raise LinkError(f"port {url!r}: the emulator takes sim:// or sim://?image=PATH")
+    images = options.get("image")
+    return SimTransport(images[-1] if images else released_image(), baud)
