@@ -1,0 +1,209 @@
+"""The one best-first search of all four planners, on flat arrays.
+
+A* (paper C, eq. 10): the open node with the least f = g + h is expanded, g the length from the start, h the straight
+distance to the goal. No move is shorter than the straight line it makes, so h is consistent and a closed node is
+final. Where the pseudo-code of paper C (figs. 3, 5, 7 and 9) never improves a node that is already open, this search
+does; without that the result is not the shortest path of the graph.
+
+Whether a move is legal is asked only when it would improve the node it leads to.
+"""
+
+from math import sqrt
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from planarm.search.draw import draw_subset
+from planarm.search.open_list import MADE, NONE, OpenList, make_open_list, pop, push, with_more_room
+from planarm.workspace.proof import PROVED, prove_line
+from planarm.workspace.world import ArmWorld
+from planarm_wire.kernel_cache import kernel
+
+UNSEEN = 0
+START = 255
+"""Values of `came_by` beside 1 + the move by which a node was reached."""
+
+FULL = -2
+"""What `expand` returns when the open list may run out of room."""
+
+BUCKETS_PER_CELL = 16.0
+"""Width of the open list's buckets: found by measurement; it changes speed, never a result."""
+
+FIRST_CAPACITY = 4096
+
+
+class Lattice(NamedTuple):
+    """The nodes row by row, with a border as wide as the longest move so that no move leaves the arrays.
+
+    A node is known by its place in these arrays.
+    """
+
+    shut: NDArray[np.uint8]
+    """1 for a node that is not to be entered: not free, border, or closed by the search."""
+    whole: NDArray[np.uint8]
+    """1 where every pose with the tip in the cell is free."""
+    width: int
+    """Nodes in a row."""
+    column: int
+    """x of node 0 in cells: a node in its column is at x = column * cell_cm."""
+    row: int
+    """y of node 0 in cells."""
+    cell_cm: float
+
+
+class Moves(NamedTuple):
+    """The stencil, one value for each move."""
+
+    dx: NDArray[np.int64]
+    dy: NDArray[np.int64]
+    jump: NDArray[np.int64]
+    """What the move adds to a node's place in the lattice."""
+    length_cm: NDArray[np.float64]
+    cover_first: NDArray[np.int64]
+    """Where the move's cells begin in `cover`; one value more than there are moves."""
+    cover: NDArray[np.int64]
+    """The cells that each move crosses, relative to the node that it leaves."""
+
+
+class Rules(NamedTuple):
+    """How moves are chosen and checked."""
+
+    proved: bool
+    """True: the whole straight move must be proved free. False: the node it leads to must be free."""
+    drawn: int
+    """Moves drawn at random at each expanded node, or 0 to use all."""
+    seed: int
+
+
+class Found(NamedTuple):
+    """What a search leaves behind."""
+
+    nodes: list[int]
+    """The path from start to goal; empty when there is none."""
+    expanded: int
+    """Nodes taken from the open list and closed, the goal included."""
+    generated: int
+    """Entries put on the open list: nodes reached for the first time or by a shorter way."""
+
+
+def best_first(lattice: Lattice, moves: Moves, rules: Rules, world: ArmWorld, start: int, goal: int) -> Found:
+    """Search a shortest path between two free nodes; `lattice.shut` is used up.
+
+    Of several entries with equal f the newest is expanded first; of several equally short ways to a node the first
+    one found is kept. With the order of the moves fixed, so is the path.
+    """
+    longest_cm = float(moves.length_cm.max())
+    queue = make_open_list(2.0 * longest_cm / lattice.cell_cm * BUCKETS_PER_CELL, FIRST_CAPACITY)
+    g_cm = np.empty(lattice.shut.size)
+    came_by = np.zeros(lattice.shut.size, np.uint8)
+    h_cm = _distance_cm(lattice, start, goal)
+    g_cm[start], came_by[start] = 0.0, START
+    push(queue.f_cm, queue.node, queue.below, queue.ring, queue.counts, 0, h_cm, start)
+    expanded = 0
+    while True:
+        last, closed = expand(lattice, moves, rules, world, goal, h_cm, g_cm, came_by, queue)
+        expanded += closed
+        if last != FULL:
+            nodes = _trace(came_by, moves.jump, goal) if last == goal else []
+            return Found(nodes, expanded, int(queue.counts[MADE]))
+        queue = with_more_room(queue)
+
+
+@kernel
+def expand(
+    lattice: Lattice,
+    moves: Moves,
+    rules: Rules,
+    world: ArmWorld,
+    goal: int,
+    lowest_f_cm: float,
+    g_cm: NDArray[np.float64],
+    came_by: NDArray[np.uint8],
+    queue: OpenList,
+) -> tuple[int, int]:
+    """Expand nodes until the goal is closed; return (goal, or NONE if it cannot be reached, or FULL; nodes closed)."""
+    shut, width, cell_cm = lattice.shut, lattice.width, lattice.cell_cm
+    dx, dy, jump, length_cm = moves.dx, moves.dy, moves.jump, moves.length_cm
+    f_cm, queued, below, heap, ring, counts = queue
+    goal_x, goal_y = goal % width, goal // width
+    order = np.arange(jump.size)
+    used = rules.drawn if rules.drawn > 0 else jump.size
+    closed = 0
+    while counts[MADE] + used <= f_cm.size:
+        node = pop(f_cm, queued, below, heap, ring, counts, shut)
+        if node == NONE:
+            return NONE, closed
+        shut[node] = 1
+        closed += 1
+        if node == goal:
+            return goal, closed
+        if rules.drawn > 0:
+            draw_subset(order, used, rules.seed, 1 + node)
+        x, y, from_g_cm = node % width, node // width, g_cm[node]
+        for i in range(used):
+            k = order[i]
+            to = node + jump[k]
+            to_g_cm = from_g_cm + length_cm[k]
+            if shut[to] or (came_by[to] != UNSEEN and to_g_cm >= g_cm[to]):
+                continue
+            if rules.proved and not move_is_free(lattice, moves, world, node, k):
+                continue
+            g_cm[to], came_by[to] = to_g_cm, 1 + k
+            to_goal_x, to_goal_y = x + dx[k] - goal_x, y + dy[k] - goal_y
+            to_f_cm = to_g_cm + cell_cm * sqrt(float(to_goal_x * to_goal_x + to_goal_y * to_goal_y))
+            bucket = int((to_f_cm - lowest_f_cm) / cell_cm * BUCKETS_PER_CELL)
+            push(f_cm, queued, below, ring, counts, bucket, to_f_cm, to)
+    return FULL, closed
+
+
+@kernel
+def move_is_free(lattice: Lattice, moves: Moves, world: ArmWorld, node: int, move: int) -> bool:
+    """Tell whether all poses of the straight move from `node` are proved free; both directions agree.
+
+    Where all cells crossed are free as a whole nothing else is asked; otherwise the line is proved by bisection.
+    """
+    mixed = False
+    for i in range(moves.cover_first[move], moves.cover_first[move + 1]):
+        if not lattice.whole[node + moves.cover[i]]:
+            mixed = True
+            break
+    if not mixed:
+        return True
+    first, last = node, node + moves.jump[move]
+    if last < first:  # the proof divides the line from its first end: fix which one that is
+        first, last = last, first
+    x0, y0 = node_cm(lattice, first)
+    x1, y1 = node_cm(lattice, last)
+    verdict, _ = prove_line(world, x0, y0, x1, y1)
+    return verdict == PROVED
+
+
+@kernel
+def node_cm(lattice: Lattice, node: int) -> tuple[float, float]:
+    """Return the (x, y) of a node."""
+    x = (lattice.column + node % lattice.width) * lattice.cell_cm
+    y = (lattice.row + node // lattice.width) * lattice.cell_cm
+    return x, y
+
+
+def load_kernels(world: ArmWorld) -> None:
+    """Compile the search, or load it from the cache, by a search from a node to itself."""
+    nothing = np.zeros(1, np.uint8)
+    one, first = np.ones(1, np.int64), np.zeros(2, np.int64)
+    lattice = Lattice(nothing, nothing, width=1, column=0, row=0, cell_cm=1.0)
+    moves = Moves(one, one, one, np.ones(1), first, one)
+    best_first(lattice, moves, Rules(proved=True, drawn=0, seed=0), world, 0, 0)
+
+
+def _distance_cm(lattice: Lattice, a: int, b: int) -> float:
+    dx, dy = a % lattice.width - b % lattice.width, a // lattice.width - b // lattice.width
+    return lattice.cell_cm * sqrt(float(dx * dx + dy * dy))
+
+
+def _trace(came_by: NDArray[np.uint8], jump: NDArray[np.int64], goal: int) -> list[int]:
+    """Walk back from the goal; return the nodes from the start on."""
+    nodes = [goal]
+    while came_by[nodes[-1]] != START:
+        nodes.append(nodes[-1] - int(jump[came_by[nodes[-1]] - 1]))
+    return nodes[::-1]

@@ -1,0 +1,105 @@
+"""Path planning on the free Cartesian space: A*, Modified A*, Chaos A* and CHS (paper C, sections IV to VII).
+
+One search for all four; they differ in the stencil (`planarm.search.stencils`), and Chaos A* in using a random subset
+of it. With `moves = "proved"` every straight move between nodes is proved free for the whole arm; with "nodes" only
+the node at its end is checked, which is how the papers read, and such a path may pass through obstacles.
+"""
+
+from dataclasses import replace
+from time import perf_counter
+
+import numpy as np
+
+from planarm.scene import PlannerSpec, Point
+from planarm.search.best_first import Found, Lattice, Rules, best_first, load_kernels, node_cm
+from planarm.search.draw import draw_subset
+from planarm.search.endpoints import Endpoint, endpoint
+from planarm.search.lattice import make_lattice, make_moves, node_at
+from planarm.search.path import Path
+from planarm.search.result import SearchResult, SearchStatus
+from planarm.search.stencils import DRAWN, Offsets, primitive, stencil
+from planarm.workspace.free_map import FreeMap
+
+
+def find_path(free_map: FreeMap, start_cm: Point, goal_cm: Point, planner: PlannerSpec) -> SearchResult:
+    """Search a shortest path of the end effector from start to goal on the map's nodes.
+
+    A start or goal that is no node is joined to the nearest free node that a proved straight move leads to, whatever
+    `planner.moves` says.
+
+    Raises:
+        ValueError: the planner's algorithm has no such neighbourhood.
+    """
+    offsets = stencil(planner.algorithm, planner.neighbours)
+    load_kernels(free_map.world)
+    begin_s = perf_counter()
+    start = endpoint(free_map, "start", start_cm)
+    goal = endpoint(free_map, "goal", goal_cm)
+    found, path = Found([], 0, 0), None
+    if start.problem:
+        status, reason = SearchStatus.START_BLOCKED, start.problem
+    elif goal.problem:
+        status, reason = SearchStatus.GOAL_BLOCKED, goal.problem
+    else:
+        lattice = make_lattice(free_map, border=int(np.abs(offsets).max()))
+        found = _search(free_map, lattice, offsets, planner, start, goal)
+        if found.nodes:
+            status, reason, path = SearchStatus.FOUND, "", _path(free_map, lattice, found, start, goal)
+        else:
+            status, reason = SearchStatus.NO_PATH, _why_no_path(free_map, offsets, planner, start, goal, found)
+    return SearchResult(status, reason, path, found.expanded, found.generated, perf_counter() - begin_s)
+
+
+def _search(
+    free_map: FreeMap, lattice: Lattice, offsets: Offsets, planner: PlannerSpec, start: Endpoint, goal: Endpoint
+) -> Found:
+    """Search from the start's node to the goal's."""
+    proved, drawn = planner.moves == "proved", 0
+    if planner.algorithm == "chaos_a_star":
+        drawn = DRAWN[planner.neighbours]
+        if planner.subset == "run":
+            offsets, drawn = _subset(offsets, drawn, planner.seed), 0
+    elif proved:
+        offsets = primitive(offsets)
+    start_node, goal_node = (node_at(lattice, end.column, end.row) for end in (start, goal))
+    rules = Rules(proved, drawn, planner.seed)
+    return best_first(lattice, make_moves(offsets, lattice), rules, free_map.world, start_node, goal_node)
+
+
+def _subset(offsets: Offsets, drawn: int, seed: int) -> Offsets:
+    """Return the moves that Chaos A* draws for a whole run, in the stencil's order."""
+    order = np.empty(len(offsets), np.int64)
+    draw_subset(order, drawn, seed, 0)
+    return offsets[np.sort(order[:drawn])]
+
+
+def _path(free_map: FreeMap, lattice: Lattice, found: Found, start: Endpoint, goal: Endpoint) -> Path:
+    """Return the path through the found nodes, with the joins to a start and goal that are no nodes."""
+    points_cm = [node_cm(lattice, node) for node in found.nodes]
+    if start.point_cm == goal.point_cm:
+        points_cm = [start.point_cm]
+    else:
+        points_cm = [start.point_cm] * (not start.on_node) + points_cm + [goal.point_cm] * (not goal.on_node)
+    return Path.through(np.array(points_cm), free_map.elbow)
+
+
+def _why_no_path(
+    free_map: FreeMap, offsets: Offsets, planner: PlannerSpec, start: Endpoint, goal: Endpoint, found: Found
+) -> str:
+    """Say what the search ran into, and which setting may help."""
+    (x0, y0), (x1, y1) = start.point_cm, goal.point_cm
+    text = (
+        f"No path from ({x0:g}, {y0:g}) to ({x1:g}, {y1:g}) cm: the moves of {planner.algorithm} with "
+        f"{planner.neighbours} neighbours lead to {found.expanded} nodes and none further, at cells of "
+        f"{free_map.cell_cm:g} cm and a margin of {free_map.margin_cm:g} cm."
+    )
+    if planner.algorithm == "chaos_a_star":
+        return text + " The random subset of the neighbours may be to blame: try another planner.seed."
+    if planner.moves == "proved":
+        lattice = make_lattice(free_map, border=int(np.abs(offsets).max()))
+        if _search(free_map, lattice, offsets, replace(planner, moves="nodes"), start, goal).nodes:
+            return text + (
+                " The nodes do connect, but the arm's move between some of them is blocked or its room too small "
+                "to be proved: a smaller workspace.cell_cm or workspace.clearance_cm may help."
+            )
+    return text + " The free space around start and goal is not connected."

@@ -1,0 +1,32 @@
+"""What a search answers; that there is no path is an answer, not an error."""
+
+from dataclasses import dataclass
+from enum import Enum
+
+from planarm.search.path import Path
+
+
+class SearchStatus(Enum):
+    """How a search ended."""
+
+    FOUND = "found"
+    NO_PATH = "no path"
+    START_BLOCKED = "start blocked"
+    GOAL_BLOCKED = "goal blocked"
+
+
+@dataclass(frozen=True, slots=True)
+class SearchResult:
+    """The answer of a search."""
+
+    status: SearchStatus
+    reason: str
+    """A sentence that says why there is no path; empty when there is one."""
+    path: Path | None
+    """The path, when the status is FOUND."""
+    expanded: int
+    """Nodes closed by the search."""
+    generated: int
+    """Entries put on its open list: nodes reached for the first time or by a shorter way."""
+    plan_s: float
+    """Wall time of the search in seconds, without compiling or loading its kernels."""
