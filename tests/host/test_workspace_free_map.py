@@ -6,7 +6,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 from host_scenes import FULL_TURN, make_scene, oracle_clearance_cm, random_obstacles
-
 from planarm.errors import SceneError
 from planarm.model.arm import Arm
 from planarm.model.kinematics import forward
@@ -71,7 +70,7 @@ def test_cells_free_as_a_whole_hold_no_pose_that_is_not_free(elbow, limits):
     tips = np.column_stack([free_map.x_cm[at[:, 1]], free_map.y_cm[at[:, 0]]])
     l1, l2 = scene.arm.link_lengths_cm
     for dx, dy in [(-0.5, -0.5), (0.5, -0.5), (-0.5, 0.5), (0.5, 0.5), *rng.uniform(-0.5, 0.5, (20, 2))]:
-        corner = tips + (dx, dy)
+        corner = tips + np.array([dx, dy])
         r = np.linalg.norm(corner, axis=1)
         assert r.min() >= world.r_min_cm
         assert r.max() <= world.r_max_cm

@@ -5,11 +5,22 @@ from math import acos, pi, radians
 import numpy as np
 import pytest
 from host_scenes import FULL_TURN, make_scene, random_obstacles
-
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from planarm.model.arm import Arm
 from planarm.model.kinematics import forward, inverse_2r
 from planarm.scene import Obstacle
-from planarm.workspace.proof import BLOCKED, PROVED, SMALLEST_CM, UNPROVED, motion_bound, prove_curve, prove_line
+from planarm.workspace.proof import (
+    BLOCKED,
+    PROVED,
+    SMALLEST_CM,
+    UNPROVED,
+    disc_verdict,
+    motion_bound,
+    next_piece,
+    prove_curve,
+    prove_line,
+)
 from planarm.workspace.world import build_world, clearances_cm
 
 INNER_20_CM = ((radians(-90), radians(270)), (-acos(-0.75), acos(-0.75)))
@@ -81,6 +92,49 @@ def test_the_motion_bound_is_never_exceeded(seed):
         if len(moved):
             tightest = max(tightest, moved[:, 0].max() / displacement)
     assert tightest > 0.8  # a bound that is far too large would pass everything above
+
+
+def test_the_turn_of_joint_1_is_bounded_by_the_extremes_of_direction_and_of_beta():
+    """asin(rho / r) plus the largest change of beta over the disc's distances, found here on 20,001 of them."""
+    rng = np.random.default_rng(6)
+    for _ in range(300):
+        scene = random_arm(rng)
+        world = build_world(scene)
+        l1, l2 = scene.arm.link_lengths_cm
+        r = float(rng.uniform(world.r_min_cm, world.r_max_cm))
+        rho = float(rng.uniform(0.05, 0.9)) * r
+        distances = np.clip(np.linspace(r - rho, r + rho, 20001), world.r_min_cm, world.r_max_cm)
+        betas = np.arccos(np.clip((distances**2 + l1**2 - l2**2) / (2 * distances * l1), -1, 1))
+        beta = np.arccos(np.clip((r**2 + l1**2 - l2**2) / (2 * r * l1), -1, 1))
+        expected = min(pi, np.arcsin(rho / r) + np.abs(betas - beta).max())
+        assert motion_bound(world, r, rho)[0] == pytest.approx(expected, abs=2e-3)
+        assert motion_bound(world, r, rho)[0] >= expected - 1e-12
+
+
+def test_a_disc_is_proved_exactly_when_the_spare_clearance_exceeds_the_bound():
+    scene = make_scene([Obstacle("circle", (40.0, -20.0), 4.0)])
+    tip, rho = np.array([30.0, 25.0]), 1.5
+    _, displacement = motion_bound(build_world(scene), float(np.hypot(*tip)), rho)
+    clearance = spare_cm(scene, build_world(scene, 0.0), tip[None])[0]
+    for share, verdict in [(0.99, PROVED), (1.01, UNPROVED)]:
+        assert disc_verdict(build_world(scene, clearance - displacement / share), *tip, rho) == verdict
+    assert disc_verdict(build_world(scene, clearance + 1e-9), *tip, rho) == BLOCKED
+
+
+@given(st.data())
+@settings(max_examples=50, deadline=None)
+def test_pieces_follow_each_other_from_0_to_1_whatever_is_split(data):
+    start, width, end = 0.0, 1.0, 0.0
+    while start < 1.0:
+        assert start == end
+        assert start % width == 0.0
+        if width > 1 / 64 and data.draw(st.booleans()):
+            width *= 0.5
+        else:
+            end = start + width
+            assert end <= 1.0
+            start, width = next_piece(start, width)
+    assert end == 1.0
 
 
 def test_points_of_link_2_move_no_farther_than_its_ends():
@@ -185,6 +239,8 @@ def test_without_obstacles_the_inner_hole_still_blocks():
     world = build_world(make_scene(limits=INNER_20_CM))
     assert prove_line(world, -25.0, 5.0, 25.0, 5.0) == (BLOCKED, 0.5)
     assert prove_line(world, -25.0, 20.0, 25.0, 20.0) == (PROVED, 1.0)
+    verdict, share = prove_line(world, -3.0, 19.9, 30.0, 19.9)  # dips in far from its middle
+    assert (verdict, share) == (BLOCKED, pytest.approx(3 / 33))
     assert prove_curve(world, -30.0, 5.0, 0.0, 15.0, 30.0, 5.0)[0] == BLOCKED
     assert prove_curve(world, -30.0, 5.0, 0.0, 45.0, 30.0, 5.0)[0] == PROVED
 

@@ -16,7 +16,7 @@ from math import acos, asin, hypot, pi, sin, sqrt
 
 from planarm_wire.kernel_cache import kernel
 
-from planarm.model.collision import cross, point_segment_distance2
+from planarm.model.collision import point_segment_distance2
 from planarm.model.kinematics import ROUNDING_CM
 from planarm.workspace.world import (
     FREE,
@@ -61,7 +61,7 @@ def motion_bound(world: ArmWorld, r_cm: float, rho_cm: float) -> tuple[float, fl
 def disc_verdict(world: ArmWorld, x_cm: float, y_cm: float, rho_cm: float) -> int:
     """Judge all poses with the tip in the disc around (x, y), as far as its tip distances are within reach and limits.
 
-    BLOCKED means that the pose at the centre is not free.
+    BLOCKED means that the pose at the centre is not free. A disc that holds the base is never proved.
     """
     r = hypot(x_cm - world.base_x_cm, y_cm - world.base_y_cm)
     if distance_region(world, r) != FREE:
@@ -73,8 +73,9 @@ def disc_verdict(world: ArmWorld, x_cm: float, y_cm: float, rho_cm: float) -> in
     if spare <= 0.0 or theta1 < world.theta1_min_rad or theta1 > world.theta1_max_rad:
         return BLOCKED
     dtheta1, displacement = motion_bound(world, r, rho_cm)
-    within_limits = theta1 - dtheta1 >= world.theta1_min_rad and theta1 + dtheta1 <= world.theta1_max_rad
-    return PROVED if within_limits and spare > displacement + ROUNDING_CM else UNPROVED
+    if theta1 - dtheta1 < world.theta1_min_rad or theta1 + dtheta1 > world.theta1_max_rad:
+        return UNPROVED
+    return PROVED if rho_cm < r and spare > displacement + ROUNDING_CM else UNPROVED
 
 
 @kernel
@@ -169,13 +170,8 @@ def blossom(p0: float, p1: float, p2: float, s: float, t: float) -> float:
 
 @kernel
 def triangle_within_reach(world: ArmWorld, ax: float, ay: float, bx: float, by: float, cx: float, cy: float) -> bool:
-    """Tell whether every point of a triangle is within reach and the limits of theta2, so outside the inner hole."""
+    """Tell whether every point of a triangle that does not hold the base is within reach and the limits of theta2."""
     ox, oy = world.base_x_cm, world.base_y_cm
-    a_left = cross(bx - ax, by - ay, ox - ax, oy - ay) > 0.0
-    b_left = cross(cx - bx, cy - by, ox - bx, oy - by) > 0.0
-    c_left = cross(ax - cx, ay - cy, ox - cx, oy - cy) > 0.0
-    if a_left == b_left == c_left:  # the base lies inside
-        return False
     farthest = max(hypot(ax - ox, ay - oy), hypot(bx - ox, by - oy), hypot(cx - ox, cy - oy))
     nearest2 = min(
         point_segment_distance2(ox, oy, ax, ay, bx, by),
