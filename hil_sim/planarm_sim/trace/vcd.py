@@ -8,11 +8,11 @@ PulseView (sigrok) set the import option "downsample" to 625, which gives one sa
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
-from typing import IO, Self
+from typing import IO, Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -86,6 +86,20 @@ class VcdWriter:
             self._advance(cycle)
         self._file.write(f"{level}{self._codes[signal]}\n")
 
+    def write(self, edges: NDArray[Any], signal_of: Mapping[int, int]) -> None:
+        """Write recorded edges in order of time.
+
+        Args:
+            edges: structured array with fields cycle, pin and level.
+            signal_of: index of the signal of each pin; edges of other pins are passed over.
+
+        Raises:
+            TraceError: edges before the latest moment written.
+        """
+        for cycle, pin, level in edges[["cycle", "pin", "level"]].tolist():
+            if pin in signal_of:
+                self.change(cycle, signal_of[pin], level)
+
     def _advance(self, cycle: int) -> None:
         if cycle < self._cycle:
             raise TraceError(f"{self._path}: cycle {cycle} comes after cycle {self._cycle}; time runs forward only")
@@ -119,7 +133,7 @@ class Vcd:
         end_cycle: last moment of the recording.
     """
 
-    edges: dict[str, NDArray[np.void]]
+    edges: dict[str, NDArray[Any]]
     start_cycle: int
     end_cycle: int
 

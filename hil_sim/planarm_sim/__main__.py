@@ -1,0 +1,70 @@
+"""`python -m planarm_sim IMAGE`: the emulated Uno on its own, behind a pseudo-terminal."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Sequence
+
+from planarm_wire import messages
+
+from planarm_sim.emulate import Emulation, emulate
+from planarm_sim.errors import SimError
+
+__all__ = ["main", "summary"]
+
+EXIT_OK, EXIT_BAD_INPUT, EXIT_PROGRAM_FAILED = 0, 2, 6
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Parse, emulate, print. Exit codes: 0 ended as asked, 2 bad input, 6 the program failed."""
+    parser = argparse.ArgumentParser(
+        prog="python -m planarm_sim",
+        description="Run an ATmega328P program on an emulated Arduino Uno behind a pseudo-terminal. The terminal's "
+        "path is printed first. Ctrl-C ends the emulation.",
+    )
+    parser.add_argument("image", metavar="IMAGE", help="program: Intel HEX or ELF")
+    parser.add_argument("--link", metavar="PATH", help="make PATH a link to the terminal")
+    parser.add_argument("--vcd", metavar="FILE", help="write the pins' waveforms")
+    parser.add_argument("--speed", choices=("real", "max"), default="real", help="default: %(default)s")
+    parser.add_argument("--baud", type=int, default=messages.BAUD, help="of the serial line; default: %(default)s")
+    parser.add_argument("--seconds", type=float, help="emulated time to run; default: until stopped")
+    parser.add_argument("--no-reset-on-open", action="store_true", help="opening the terminal does not reset the board")
+    options = parser.parse_args(arguments)
+    try:
+        result = emulate(
+            options.image,
+            link=options.link,
+            vcd=options.vcd,
+            speed=options.speed,
+            baud=options.baud,
+            seconds=options.seconds,
+            reset_on_open=not options.no_reset_on_open,
+            announce=_print_line,
+            say=lambda text: _print_line(f"note: {text}"),
+        )
+    except SimError as error:
+        sys.stderr.write(f"error: {error}\n")
+        return EXIT_BAD_INPUT
+    for text in (*(f"note: {warning}" for warning in result.warnings), summary(result)):
+        _print_line(text)
+    return EXIT_PROGRAM_FAILED if result.program_failed else EXIT_OK
+
+
+def summary(result: Emulation) -> str:
+    """The closing line."""
+    edges = ", ".join(f"{name} {count}" for name, count in result.rising_edges.items()) or "none"
+    return (
+        f"{result.ended}; {result.cycles} cycles in {result.clock_s:.2f} s ({result.ratio:.2f} x real time); "
+        f"rising edges: {edges}; serial: {result.counts.from_host_bytes} bytes in, "
+        f"{result.counts.to_host_bytes} out, {result.counts.lost_bytes} lost"
+    )
+
+
+def _print_line(text: str) -> None:
+    sys.stdout.write(f"{text}\n")
+    sys.stdout.flush()
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,145 @@
+"""The host's end of the Uno's serial line, in emulated time.
+
+Frames are 8N1, ten bits a byte (ATmega328P datasheet, 19.4). Host to board, bytes follow one another without
+gaps; board to host, a byte can be read once its stop bit has passed. The host samples in the middle of its own
+bits, so a program that set another baud rate is received as garbage here as well.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from dataclasses import dataclass
+from typing import Any
+
+from numpy.typing import NDArray
+
+from planarm_sim.cpu.chip import Chip
+from planarm_sim.errors import UsageError
+
+__all__ = ["CLOCK_HZ", "FRAME_BITS", "SerialPort", "SerialState"]
+
+CLOCK_HZ = 16_000_000
+FRAME_BITS = 10
+MAX_BAUD = 2_000_000
+"""Fastest rate of the chip's receiver at 16 MHz (datasheet, 19.10)."""
+
+
+@dataclass(frozen=True, slots=True)
+class SerialState:
+    """What `SerialPort.snapshot` keeps."""
+
+    baud: int
+    burst_start: int
+    burst_bytes: int
+    ends: tuple[int, ...]
+    received: bytes
+    framing_errors: int
+
+
+class SerialPort:
+    """Bytes to and from the board.
+
+    Args:
+        chip: the chip whose RXD and TXD this line is wired to.
+        baud: the host's rate, bits a second.
+    """
+
+    def __init__(self, chip: Chip, baud: int) -> None:
+        self._chip = chip
+        self._burst_start = 0  # cycle at which the bytes written without a gap began
+        self._burst_bytes = 0
+        self._ends: deque[int] = deque()  # ends of the stop bits still to come
+        self._received = bytearray()
+        self._framing_errors = 0
+        self.baud = baud
+
+    @property
+    def baud(self) -> int:
+        """The host's rate, bits a second; a change holds for the bytes written from then on.
+
+        Raises:
+            UsageError: set outside 300 to 2,000,000.
+        """
+        return self._baud
+
+    @baud.setter
+    def baud(self, value: int) -> None:
+        if not 300 <= value <= MAX_BAUD:
+            raise UsageError(f"baud is {value}; a 16 MHz Uno takes 300 to {MAX_BAUD}")
+        if self._burst_bytes:
+            self._burst_start, self._burst_bytes = self._line_free_cycle(), 0
+        self._baud = value
+
+    @property
+    def pending(self) -> int:
+        """Bytes written whose stop bit has not passed yet."""
+        while self._ends and self._ends[0] <= self._chip.cycle:
+            self._ends.popleft()
+        return len(self._ends)
+
+    @property
+    def framing_errors(self) -> int:
+        """Bytes received so far whose stop bit was not where the host looked: the baud rates differ."""
+        return self._framing_errors
+
+    def write(self, data: bytes) -> None:
+        """Send bytes to the board; the first starts now, or after those still on their way."""
+        if self._line_free_cycle() < self._chip.cycle:
+            self._burst_start, self._burst_bytes = self._chip.cycle, 0
+        bit_cycles = CLOCK_HZ / self._baud
+        for byte in data:
+            self._chip.push_rx(self._line_free_cycle(), bit_cycles, byte)
+            self._burst_bytes += 1
+            self._ends.append(self._line_free_cycle())
+
+    def read(self) -> bytes:
+        """Take everything received so far."""
+        data = bytes(self._received)
+        self._received.clear()
+        return data
+
+    def peek(self) -> bytes:
+        """Everything received so far, left in place."""
+        return bytes(self._received)
+
+    def collect(self) -> None:
+        """Fetch the frames that the chip has sent; the board calls this after every run."""
+        for frame in self._chip.drain_tx():
+            self._receive(frame)
+
+    def snapshot(self) -> SerialState:
+        """Copy the line's state."""
+        return SerialState(
+            self._baud,
+            self._burst_start,
+            self._burst_bytes,
+            tuple(self._ends),
+            bytes(self._received),
+            self._framing_errors,
+        )
+
+    def restore(self, state: SerialState) -> None:
+        """Go back to `state`."""
+        self._baud = state.baud
+        self._burst_start, self._burst_bytes = state.burst_start, state.burst_bytes
+        self._ends = deque(state.ends)
+        self._received = bytearray(state.received)
+        self._framing_errors = state.framing_errors
+
+    def _line_free_cycle(self) -> int:
+        """First cycle after the last byte written; exact, so that no rounding adds up over a burst."""
+        return self._burst_start - (-self._burst_bytes * FRAME_BITS * CLOCK_HZ // self._baud)
+
+    def _receive(self, frame: NDArray[Any]) -> None:
+        """Sample one frame as the host's UART does, from its start bit on; the line is high when it has ended."""
+        byte, board_bit = int(frame["byte"]), int(frame["bit_cycles"])
+        if board_bit * self._baud == CLOCK_HZ:
+            self._received.append(byte)
+            return
+        wave = byte << 1 | 0x200  # start bit, eight data bits from the lowest on, stop bit
+        host_bit = CLOCK_HZ / self._baud
+        samples = [wave >> min(int((n + 0.5) * host_bit / board_bit), FRAME_BITS - 1) & 1 for n in range(FRAME_BITS)]
+        if samples[0] == 1:
+            return  # the host's start bit check finds the line high again: a spike
+        self._framing_errors += samples[-1] == 0
+        self._received.append(sum(bit << n for n, bit in enumerate(samples[1:-1])))

@@ -1,0 +1,276 @@
+"""An Arduino Uno: an ATmega328P at 16 MHz with named pins and a serial line.
+
+Time is the chip's: clock cycles of 62.5 ns since power-up. It passes in `run` and `run_until` only, so that a test
+says exactly when what happens, and two runs with the same calls are the same to the last edge.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import NDArray
+from planarm_wire import messages
+
+from planarm_sim.board.pins import PINS, PinPlace, pin_place
+from planarm_sim.board.serial import CLOCK_HZ, FRAME_BITS, SerialPort, SerialState
+from planarm_sim.cpu.chip import EDGE_DTYPE, Chip, ResetCause, Snapshot, StopCause
+from planarm_sim.errors import LimitError, PinError, StoppedError, UsageError
+from planarm_sim.loader import Image, load_elf, load_hex, load_image
+from planarm_sim.trace import EDGE, VcdWriter
+
+__all__ = ["CLOCK_HZ", "Pin", "Uno", "UnoSnapshot"]
+
+DEFAULT_BAUD = messages.BAUD
+
+
+@dataclass(frozen=True, slots=True)
+class UnoSnapshot:
+    """Everything that decides the further run, recorded edges and serial bytes included; opaque."""
+
+    chip: Snapshot
+    serial: SerialState
+    edges: tuple[NDArray[Any], ...]
+    log_start_cycle: int
+    log_start_levels: tuple[int, ...]
+
+
+class Pin:
+    """One pin of the board, made by `Uno.pin`."""
+
+    def __init__(self, chip: Chip, place: PinPlace) -> None:
+        self._chip = chip
+        self._place = place
+
+    @property
+    def name(self) -> str:
+        """The name printed on the board."""
+        return self._place.name
+
+    @property
+    def level(self) -> int:
+        """The electrical level now, 0 or 1; a floating pin reads 0."""
+        return self._chip.pin_level(self._place.index)
+
+    def drive(self, level: int) -> None:
+        """Hold the pin at 0 or 1 from outside, from now on.
+
+        Raises:
+            PinError: another level.
+        """
+        if level not in (0, 1):
+            raise PinError(f"pin {self.name} cannot be driven to {level!r}; levels are 0 and 1")
+        self._chip.drive_pin(self._place.index, int(level))
+
+    def release(self) -> None:
+        """Let go of the pin."""
+        self._chip.drive_pin(self._place.index, None)
+
+
+class Uno:
+    """The board with a program in its flash, at power-up.
+
+    Args:
+        image: the program.
+        baud: the host's rate on the serial line; see `serial`.
+
+    Attributes:
+        serial: the host's end of the serial line.
+    """
+
+    def __init__(self, image: Image, *, baud: int = DEFAULT_BAUD) -> None:
+        self._source = image.source
+        self._chip = Chip(image.flash)
+        self.serial = SerialPort(self._chip, baud)
+        self._edges: list[NDArray[Any]] = []
+        self._log_start_cycle = 0
+        self._log_start_levels = self._levels()
+
+    @classmethod
+    def from_hex(cls, path: str | Path, *, baud: int = DEFAULT_BAUD) -> Self:
+        """Power up with the program of an Intel HEX file.
+
+        Raises:
+            ImageError: the file cannot be loaded.
+        """
+        return cls(load_hex(path), baud=baud)
+
+    @classmethod
+    def from_elf(cls, path: str | Path, *, baud: int = DEFAULT_BAUD) -> Self:
+        """Power up with the program of an ELF executable, as avr-gcc links it.
+
+        Raises:
+            ImageError: the file cannot be loaded.
+        """
+        return cls(load_elf(path), baud=baud)
+
+    @classmethod
+    def from_file(cls, path: str | Path, *, baud: int = DEFAULT_BAUD) -> Self:
+        """Power up with the program of a file of either kind.
+
+        Raises:
+            ImageError: the file cannot be loaded.
+        """
+        return cls(load_image(path), baud=baud)
+
+    @property
+    def cycle(self) -> int:
+        """Clock cycles of 62.5 ns since power-up; a reset does not set them back."""
+        return self._chip.cycle
+
+    @property
+    def time_s(self) -> float:
+        """Seconds since power-up."""
+        return self._chip.cycle / CLOCK_HZ
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """One line for each register of a part that is not modelled which the program touched."""
+        return tuple(
+            f"{touch.register} (0x{touch.address:02X}) belongs to a part that is not modelled; "
+            f"the program touched it first at 0x{2 * touch.pc:04X}"
+            for touch in self._chip.unmodelled()
+        )
+
+    def run(self, *, cycles: int | None = None, seconds: float | None = None) -> None:
+        """Let time pass, by a number of cycles or of seconds; the last instruction is finished.
+
+        Raises:
+            UsageError: not exactly one of the two, or negative.
+            StoppedError: the program came to an end before: undefined opcode, BREAK, asleep for ever.
+        """
+        if (cycles is None) == (seconds is None):
+            raise UsageError("run takes either cycles or seconds")
+        length = round(seconds * CLOCK_HZ) if seconds is not None else int(cycles or 0)
+        if length < 0:
+            raise UsageError(f"run was asked for {length} cycles; time runs forward only")
+        self._run_to(self._chip.cycle + length)
+
+    def run_until(
+        self, awaited: bytes | Callable[[Uno], bool], *, limit_s: float, every_cycles: int | None = None
+    ) -> None:
+        """Let time pass until the board has sent certain bytes, or until a condition holds.
+
+        Args:
+            awaited: bytes that must turn up among those not yet read (they stay there), or a function of the
+                board that tells whether to stop.
+            limit_s: longest time to wait, seconds.
+            every_cycles: how often to look; None means the time of one byte on the serial line.
+
+        Raises:
+            LimitError: it did not come in time.
+            StoppedError: the program came to an end before.
+        """
+        step = every_cycles or FRAME_BITS * CLOCK_HZ // self.serial.baud
+        end = self._chip.cycle + round(limit_s * CLOCK_HZ)
+        while not (awaited in self.serial.peek() if isinstance(awaited, bytes) else awaited(self)):
+            if self._chip.cycle >= end:
+                what = repr(awaited) if isinstance(awaited, bytes) else getattr(awaited, "__name__", "the condition")
+                raise LimitError(
+                    f"{self._source}: waited {limit_s} s for {what}, until {self.time_s:.6f} s; "
+                    f"not yet read from the board: {self.serial.peek()!r}",
+                    self._chip.cycle,
+                )
+            self._run_to(min(self._chip.cycle + step, end))
+
+    def reset(self) -> None:
+        """Press the reset button: an external reset, now. SRAM and the bytes on the serial line stay."""
+        self._chip.reset(ResetCause.EXTERNAL)
+        self._collect()
+
+    def pin(self, name: str) -> Pin:
+        """A pin by its name on the board: "D0" to "D13", "A0" to "A5".
+
+        Raises:
+            PinError: the board has no such pin; the message names the closest.
+        """
+        return Pin(self._chip, pin_place(name))
+
+    def edges(self, name: str) -> NDArray[Any]:
+        """Level changes that the program made on a pin since power-up, or since `clear_edges`.
+
+        Returns:
+            Structured array in order of time, fields cycle (int64) and level (uint8).
+
+        Raises:
+            PinError: the board has no such pin.
+        """
+        recorded = self._recorded()
+        chosen = recorded[recorded["pin"] == pin_place(name).index]
+        result = np.empty(len(chosen), EDGE)
+        result["cycle"], result["level"] = chosen["cycle"], chosen["level"]
+        return result
+
+    def clear_edges(self) -> None:
+        """Forget the level changes recorded so far, of all pins."""
+        self.take_edges()
+
+    def take_edges(self) -> NDArray[Any]:
+        """Return the level changes of all pins recorded so far and forget them; for runs without end.
+
+        Returns:
+            Structured array in order of time, fields cycle, pin (chip numbering, see `pins`) and level.
+        """
+        taken = self._recorded()
+        self._edges = []
+        self._log_start_cycle, self._log_start_levels = self.cycle, self._levels()
+        return taken
+
+    def write_vcd(self, path: str | Path, names: Sequence[str]) -> None:
+        """Write the recorded level changes of some pins as a waveform file.
+
+        Raises:
+            PinError: the board has no such pin.
+            TraceError: the file cannot be written.
+        """
+        signal_of = {pin_place(name).index: number for number, name in enumerate(names)}
+        start = dict(zip(PINS, self._log_start_levels, strict=True))
+        levels = [start[pin_place(name)] for name in names]
+        with VcdWriter(path, names, levels, self._log_start_cycle) as vcd:
+            vcd.write(self._recorded(), signal_of)
+            vcd.close(self.cycle)
+
+    def snapshot(self) -> UnoSnapshot:
+        """Copy everything that decides the further run."""
+        return UnoSnapshot(
+            self._chip.snapshot(),
+            self.serial.snapshot(),
+            tuple(self._edges),
+            self._log_start_cycle,
+            self._log_start_levels,
+        )
+
+    def restore(self, snapshot: UnoSnapshot) -> None:
+        """Go back to a snapshot of this board; with the same calls the same run follows."""
+        self._chip.restore(snapshot.chip)
+        self.serial.restore(snapshot.serial)
+        self._edges = list(snapshot.edges)
+        self._log_start_cycle, self._log_start_levels = snapshot.log_start_cycle, snapshot.log_start_levels
+
+    def _run_to(self, target: int) -> None:
+        cause = self._chip.run_to(target)
+        self._collect()
+        if cause is not StopCause.REACHED:
+            raise StoppedError(
+                f"{self._source}: the program ended at cycle {self.cycle} ({self.time_s:.6f} s): {cause.value}",
+                self.cycle,
+                cause.name,
+            )
+
+    def _collect(self) -> None:
+        self.serial.collect()
+        edges = self._chip.drain_edges()
+        if len(edges):
+            self._edges.append(edges)
+
+    def _recorded(self) -> NDArray[Any]:
+        """All recorded edges in one array; joined once, then kept so."""
+        if len(self._edges) != 1:
+            self._edges = [np.concatenate([np.empty(0, EDGE_DTYPE), *self._edges])]
+        return self._edges[0]
+
+    def _levels(self) -> tuple[int, ...]:
+        return tuple(self._chip.pin_level(place.index) for place in PINS)

@@ -1,0 +1,8 @@
+"""Serial lines from the emulated board to hosts outside of this process."""
+
+from __future__ import annotations
+
+from planarm_sim.bridge.bridge import Bridge, BridgeCounts, Speed
+from planarm_sim.bridge.line import Clock, Line, WallClock
+
+__all__ = ["Bridge", "BridgeCounts", "Clock", "Line", "Speed", "WallClock"]

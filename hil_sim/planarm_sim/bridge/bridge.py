@@ -1,0 +1,189 @@
+"""Couples the emulated Uno to a line of bytes and to a clock.
+
+One thread, one loop: run the chip up to the moment that the clock shows, hand over what it sent, take what the host
+sent, sleep until there is something to do. Bytes are paced at the baud rate by `Uno.serial`, in emulated time, in
+both directions. Two speeds:
+
+- real: emulated time follows the clock; the processor sleeps for the rest.
+- max: emulated time runs as fast as it can be computed. Bytes take the same emulated time on the line as ever, so
+  order, overruns and replies are those of the real speed; but to a host that measures by the clock the board looks
+  some ten times faster, so use it with hosts that wait for answers rather than for moments.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Literal
+
+from planarm_sim.board import CLOCK_HZ, Uno
+from planarm_sim.bridge.line import Clock, Line
+
+__all__ = ["Bridge", "BridgeCounts", "Speed"]
+
+Speed = Literal["real", "max"]
+
+BRIDGE_RING_BYTES = 128
+"""Bytes taken from the host ahead of the line, as the ring of the Uno's USB bridge: beyond it the host waits."""
+
+LIVELY_SLICE_S = 0.000_25
+"""Real speed: longest sleep while bytes are under way; 6 bytes at 250,000 baud."""
+
+QUIET_SLICE_S = 0.002
+"""Longest sleep otherwise: how late an opened port, a stop or the board's first byte may be noticed."""
+
+QUIET_AFTER_S = 0.005
+"""The line counts as lively for so long after its last byte: a firmware's answer may be under way."""
+
+MAX_CHUNK_S = 0.010
+"""Longest piece of emulated time between two looks at the line."""
+
+GIVE_UP_LAG_S = 0.250
+"""Lag behind the clock that is not caught up any more, but reported and forgotten."""
+
+
+@dataclass(frozen=True, slots=True)
+class BridgeCounts:
+    """What passed the bridge.
+
+    Attributes:
+        opened: how often a host opened the line.
+        from_host_bytes: bytes taken from hosts.
+        to_host_bytes: bytes handed to hosts.
+        lost_bytes: bytes the board sent that nobody took: port closed, or the host's buffer full.
+        lag_given_up_s: emulated time that was lost against the clock, in all.
+    """
+
+    opened: int = 0
+    from_host_bytes: int = 0
+    to_host_bytes: int = 0
+    lost_bytes: int = 0
+    lag_given_up_s: float = 0.0
+
+
+class Bridge:
+    """The loop, one `step` at a time.
+
+    Args:
+        uno: the board.
+        line: the host's side.
+        clock: the time that `speed` "real" follows.
+        speed: see the module's text.
+        reset_on_open: press reset when a host opens the line, as a Uno does (its DTR line resets it).
+        say: takes notices for the user, one line each.
+        after_run: called after every piece of emulated time, to carry recorded edges away.
+    """
+
+    def __init__(
+        self,
+        uno: Uno,
+        line: Line,
+        clock: Clock,
+        *,
+        speed: Speed = "real",
+        reset_on_open: bool = True,
+        say: Callable[[str], None],
+        after_run: Callable[[], None],
+    ) -> None:
+        self._uno = uno
+        self._line = line
+        self._clock = clock
+        self._real = speed == "real"
+        self._reset_on_open = reset_on_open
+        self._say = say
+        self._after_run = after_run
+        self._is_open = False
+        self._opened = self._from_host = self._to_host = self._lost = 0
+        self._lag_given_up_s = 0.0
+        self._quiet_from_cycle = 0
+        self._stopping = False
+        self._anchor_s = clock.now_s()
+        self._anchor_cycle = uno.cycle
+
+    @property
+    def counts(self) -> BridgeCounts:
+        """What passed so far."""
+        return BridgeCounts(self._opened, self._from_host, self._to_host, self._lost, self._lag_given_up_s)
+
+    def stop(self) -> None:
+        """End `run` after its present step; may be called from a signal handler."""
+        self._stopping = True
+
+    def run(self, seconds: float | None = None) -> None:
+        """Step until `stop`, or for so many seconds of emulated time.
+
+        Raises:
+            StoppedError: the program came to an end; see `Uno.run`.
+        """
+        end = None if seconds is None else self._uno.cycle + round(seconds * CLOCK_HZ)
+        while not self._stopping and (end is None or self._uno.cycle < end):
+            self.step(end)
+
+    def step(self, end_cycle: int | None = None) -> None:
+        """Run the chip up to now (at most to `end_cycle`), serve the line, and sleep for the time that is left."""
+        self._notice_open()
+        uno = self._uno
+        target = min(self._target_cycle(), uno.cycle + round(MAX_CHUNK_S * CLOCK_HZ))
+        if end_cycle is not None:
+            target = min(target, end_cycle)
+        if target > uno.cycle:
+            uno.run(cycles=target - uno.cycle)
+            self._after_run()
+        self._to_line()
+        self._from_line()
+        self._sleep()
+
+    def _notice_open(self) -> None:
+        is_open = self._line.is_open()
+        if is_open and not self._is_open:
+            self._opened += 1
+            if self._reset_on_open:
+                self._uno.reset()
+        self._is_open = is_open
+
+    def _target_cycle(self) -> int:
+        uno = self._uno
+        if not self._real:
+            return uno.cycle + round((QUIET_SLICE_S if self._is_quiet() else LIVELY_SLICE_S) * CLOCK_HZ)
+        target = self._anchor_cycle + int((self._clock.now_s() - self._anchor_s) * CLOCK_HZ)
+        lag_s = (target - uno.cycle) / CLOCK_HZ
+        if lag_s > GIVE_UP_LAG_S:
+            if self._lag_given_up_s == 0.0:
+                self._say(
+                    f"emulation is {lag_s:.2f} s behind the clock at {uno.time_s:.3f} s: the computer is too slow or "
+                    f"too busy for real time; the board's clock lags from here on"
+                )
+            self._lag_given_up_s += lag_s
+            self._anchor_s += lag_s
+            return uno.cycle
+        return target
+
+    def _is_quiet(self) -> bool:
+        return self._uno.cycle > self._quiet_from_cycle and self._uno.serial.pending == 0
+
+    def _lively(self) -> None:
+        self._quiet_from_cycle = self._uno.cycle + round(QUIET_AFTER_S * CLOCK_HZ)
+
+    def _to_line(self) -> None:
+        data = self._uno.serial.read()
+        if not data:
+            return
+        self._lively()
+        taken = self._line.write(data) if self._is_open else 0  # else the next host would read old bytes
+        self._to_host += taken
+        self._lost += len(data) - taken
+
+    def _from_line(self) -> None:
+        data = self._line.read(BRIDGE_RING_BYTES - self._uno.serial.pending) if self._is_open else b""
+        if data:
+            self._from_host += len(data)
+            self._uno.serial.write(data)
+            self._lively()
+
+    def _sleep(self) -> None:
+        if self._real:
+            quiet = self._is_quiet()
+            ahead_s = (self._uno.cycle - self._anchor_cycle) / CLOCK_HZ - (self._clock.now_s() - self._anchor_s)
+            timeout_s = ahead_s + (QUIET_SLICE_S if quiet else LIVELY_SLICE_S)
+            room = self._uno.serial.pending < BRIDGE_RING_BYTES
+            self._line.wait(timeout_s, for_bytes=room)

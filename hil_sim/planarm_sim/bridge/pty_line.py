@@ -1,0 +1,98 @@
+"""A pseudo-terminal that looks like the Uno's serial port: hosts open it by path, close it and open it again.
+
+A pty is not a UART: it takes any baud rate and ignores it, buffers some kilobytes, and has no DTR line. Pacing is
+therefore the bridge's work, and "a host opened the port" is seen from the hang-up state of the master side.
+"""
+
+from __future__ import annotations
+
+import errno
+import os
+import pty
+import select
+import tty
+from pathlib import Path
+from types import TracebackType
+from typing import Self
+
+from planarm_sim.errors import BridgeError
+
+__all__ = ["PtyLine"]
+
+
+class PtyLine:
+    """The master side of a pty in raw mode, with an optional link at a fixed path. A context manager.
+
+    Args:
+        link: path of a symbolic link to make; a dangling link there, left by a killed emulator, is replaced.
+
+    Raises:
+        BridgeError: no pty to be had, or `link` exists and is not such a leftover, or cannot be made.
+    """
+
+    def __init__(self, link: str | Path | None = None) -> None:
+        try:
+            self._fd, slave = pty.openpty()
+        except OSError as error:
+            raise BridgeError(f"no pseudo-terminal: {error.strerror}") from error
+        try:
+            tty.setraw(slave)  # bytes pass unchanged also for hosts that set nothing; stays set when all have closed
+            self.path = os.ttyname(slave)
+            """Path of the terminal that a host opens."""
+        finally:
+            os.close(slave)
+        os.set_blocking(self._fd, False)
+        self._poll = select.poll()
+        self._poll.register(self._fd, select.POLLIN)
+        self._link = Path(link) if link is not None else None
+        if self._link is not None:
+            self._make_link(self._link)
+
+    def _make_link(self, link: Path) -> None:
+        try:
+            if link.is_symlink() and not link.exists():
+                link.unlink()
+            link.symlink_to(self.path)
+        except OSError as error:
+            os.close(self._fd)
+            raise BridgeError(f"cannot link {link} to {self.path}: {error.strerror}; give another --link") from error
+
+    def is_open(self) -> bool:
+        """Tell whether a host has the terminal open, or has closed it with bytes still to be read."""
+        return all(events & select.POLLIN or not events & select.POLLHUP for _, events in self._poll.poll(0))
+
+    def read(self, most: int) -> bytes:
+        """Take up to `most` bytes that the host sent; b"" when there are none, or when it has closed."""
+        try:
+            return os.read(self._fd, most) if most > 0 else b""
+        except OSError as error:
+            if error.errno in (errno.EIO, errno.EAGAIN):  # closed by the host; nothing there
+                return b""
+            raise
+
+    def write(self, data: bytes) -> int:
+        """Hand bytes to the host; returns how many its buffer took."""
+        try:
+            return os.write(self._fd, data)
+        except BlockingIOError:
+            return 0
+
+    def wait(self, timeout_s: float, *, for_bytes: bool) -> None:
+        """Sleep for `timeout_s`, or, when `for_bytes`, until the host sends or closes, if that comes first."""
+        # A terminal nobody has open reports a hang-up at once, for ever: it must not be waited for.
+        watched = [self._fd] if for_bytes and self.is_open() else []
+        select.select(watched, [], [], max(timeout_s, 0.0))
+
+    def close(self) -> None:
+        """Remove the link, if it is still this terminal's, and close the terminal."""
+        if self._link is not None and self._link.is_symlink() and str(self._link.readlink()) == self.path:
+            self._link.unlink()
+        os.close(self._fd)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
+    ) -> None:
+        self.close()

@@ -1,0 +1,247 @@
+"""The bridge between board, line and clock: all of it in emulated time, with a line and a clock made here."""
+
+from collections import deque
+from pathlib import Path
+
+import pytest
+from planarm_sim import Uno
+from planarm_sim.board import CLOCK_HZ
+from planarm_sim.bridge import Bridge
+from planarm_sim.bridge.bridge import BRIDGE_RING_BYTES, GIVE_UP_LAG_S, LIVELY_SLICE_S, MAX_CHUNK_S, QUIET_SLICE_S
+
+DATA = Path(__file__).parent / "data"
+BYTE_S = 40e-6  # ten bits at 250,000 baud
+POWER_UP, RESET = b"R\x01", b"R\x02"  # what echo.S sends first: 'R' and MCUSR
+
+
+class FakeClock:
+    """Moves when someone sleeps, and by `cost_s` at every look, as if computing took that long."""
+
+    def __init__(self, cost_s: float = 0.0) -> None:
+        self.time_s = 0.0
+        self.cost_s = cost_s
+
+    def now_s(self) -> float:
+        self.time_s += self.cost_s
+        return self.time_s
+
+
+class FakeLine:
+    """A host whose acts are laid down by time: at `when` seconds it opens, sends bytes, or closes."""
+
+    def __init__(self, clock: FakeClock, acts: list[tuple[float, str | bytes]], room: int = 10**6) -> None:
+        self.clock = clock
+        self.start_s = 0.0  # the clock's first moment, so that sums of times are exact
+        self.acts = deque(sorted(acts, key=lambda act: act[0]))
+        self.open = False
+        self.inbox = bytearray()  # host to board
+        self.received: list[tuple[float, bytes]] = []  # board to host, with the time
+        self.room = room
+        self.waits: list[float] = []
+        self.most_taken = 0
+
+    def _catch_up(self) -> None:
+        while self.acts and self.acts[0][0] <= self.clock.time_s - self.start_s:
+            _, act = self.acts.popleft()
+            if isinstance(act, bytes):
+                assert self.open, "a host writes to an open line only"
+                self.inbox += act
+            else:
+                self.open = act == "open"
+
+    def is_open(self) -> bool:
+        self._catch_up()
+        return self.open or bool(self.inbox)
+
+    def read(self, most: int) -> bytes:
+        self._catch_up()
+        assert most >= 0
+        data = bytes(self.inbox[:most])
+        del self.inbox[:most]
+        return data
+
+    def write(self, data: bytes) -> int:
+        assert self.open, "nobody is there to read"
+        taken = min(len(data), self.room)
+        self.room -= taken
+        if taken:
+            self.received.append((self.clock.time_s - self.start_s, data[:taken]))
+        return taken
+
+    def wait(self, timeout_s: float, *, for_bytes: bool) -> None:
+        self._catch_up()
+        if for_bytes and self.inbox:
+            return
+        wake = self.clock.time_s + max(timeout_s, 0.0)
+        if for_bytes and self.open and self.acts:
+            wake = min(wake, max(self.start_s + self.acts[0][0], self.clock.time_s))
+        self.waits.append(wake - self.clock.time_s)
+        self.clock.time_s = wake
+
+    @property
+    def text(self) -> bytes:
+        return b"".join(data for _, data in self.received)
+
+
+class Rig:
+    def __init__(self, acts, *, image="echo.hex", speed="real", reset_on_open=True, cost_s=0.0, room=10**6) -> None:
+        self.uno = Uno.from_hex(DATA / image)
+        self.clock = FakeClock()
+        self.line = FakeLine(self.clock, acts, room)
+        self.said: list[str] = []
+        self.steps = 0
+        self.bridge = Bridge(
+            self.uno,
+            self.line,
+            self.clock,
+            speed=speed,
+            reset_on_open=reset_on_open,
+            say=self.said.append,
+            after_run=self._count,
+        )
+        self.clock.cost_s = cost_s
+
+    def _count(self) -> None:
+        self.steps += 1
+
+
+# --- real time ---
+
+
+def test_emulated_time_follows_the_clock():
+    rig = Rig([(0.0, "open")])
+    rig.bridge.run(seconds=0.5)
+    assert rig.uno.time_s == pytest.approx(0.5, abs=1e-6)
+    assert rig.clock.time_s - rig.line.start_s == pytest.approx(0.5, abs=1.5 * QUIET_SLICE_S)
+    assert rig.said == []
+
+
+@pytest.mark.parametrize("acts", [[], [(0.0, "open")]], ids=["closed", "open and silent"])
+def test_a_quiet_line_lets_the_processor_sleep(acts):
+    rig = Rig(acts)
+    rig.bridge.run(seconds=0.5)
+    # The board greets at power-up and after the reset by opening: some lively milliseconds. Then quiet slices only.
+    assert rig.steps < 0.5 / QUIET_SLICE_S + 100
+    assert min(rig.line.waits[-100:-1]) == pytest.approx(QUIET_SLICE_S)
+    assert sum(rig.line.waits) == pytest.approx(0.5, abs=1.5 * QUIET_SLICE_S)
+
+
+def test_bytes_come_back_in_order_and_no_sooner_than_the_line_carries_them():
+    text = bytes(range(10, 210))
+    rig = Rig([(0.0, "open"), (0.1, text)])
+    rig.bridge.run(seconds=0.2)
+    assert rig.line.text == RESET + bytes(byte + 1 for byte in text)
+    echoed = [(when, data) for when, data in rig.line.received if when > 0.1]
+    count = 0
+    for when, data in echoed:
+        count += len(data)
+        assert when >= 0.1 + (count + 1) * BYTE_S - 10e-6, "in and out, one byte overlapping the next"
+    assert echoed[-1][0] <= 0.1 + 201 * BYTE_S + 2 * LIVELY_SLICE_S
+    assert rig.bridge.counts.from_host_bytes == 200
+    assert rig.bridge.counts.to_host_bytes == 202
+
+
+def test_an_answer_to_a_quiet_line_comes_at_once():
+    rig = Rig([(0.0, "open"), (0.1, b"a"), (0.15003, b"b")])
+    rig.bridge.run(seconds=0.2)
+    answers = [when for when, data in rig.line.received if data in (b"b", b"c")]
+    assert [a - b for a, b in zip(answers, (0.1, 0.15003), strict=True)] == pytest.approx(
+        [2 * BYTE_S, 2 * BYTE_S], abs=2 * LIVELY_SLICE_S
+    )
+
+
+def test_the_host_is_held_back_beyond_the_ring():
+    rig = Rig([(0.0, "open"), (0.01, bytes([9] * 1000))])
+    fullest = 0
+
+    def watch() -> None:
+        nonlocal fullest
+        fullest = max(fullest, rig.uno.serial.pending)
+
+    rig.bridge._after_run = watch
+    rig.bridge.run(seconds=0.03)
+    assert BRIDGE_RING_BYTES - 10 <= fullest <= BRIDGE_RING_BYTES
+    assert rig.line.inbox, "20 ms carry 500 of the 1000 bytes"
+    rig.bridge.run(seconds=0.03)
+    assert rig.line.text == RESET + bytes([10] * 1000)
+
+
+# --- opening and closing ---
+
+
+def test_opening_resets_the_board_as_a_uno_does():
+    rig = Rig([(0.05, "open"), (0.10, "close"), (0.15, "open"), (0.16, b"a"), (0.17, "close")])
+    rig.bridge.run(seconds=0.2)
+    assert rig.line.text == RESET + RESET + b"b"
+    assert rig.bridge.counts.opened == 2
+    assert rig.bridge.counts.lost_bytes == len(POWER_UP), "sent before anyone had opened"
+
+
+def test_opening_can_be_harmless():
+    rig = Rig([(0.05, "open"), (0.06, b"a"), (0.10, "close"), (0.15, "open"), (0.16, b"c")], reset_on_open=False)
+    rig.bridge.run(seconds=0.2)
+    assert rig.line.text == b"bd"
+
+
+def test_what_is_sent_to_a_closed_line_does_not_reach_the_next_host():
+    rig = Rig([(0.05, "open"), (0.1, b"abc"), (0.1, "close"), (0.15, "open")])
+    rig.bridge.run(seconds=0.2)
+    assert rig.line.text == RESET + RESET
+    counts = rig.bridge.counts
+    assert counts.from_host_bytes == 3, "the board still gets what the host sent last"
+    assert counts.lost_bytes == len(POWER_UP) + 3
+
+
+def test_a_host_that_does_not_read_loses_bytes_and_stops_nothing():
+    rig = Rig([(0.0, "open"), (0.01, bytes([7] * 50))], room=12)
+    rig.bridge.run(seconds=0.05)
+    assert rig.line.text == RESET + bytes([8] * 10)
+    assert rig.bridge.counts.lost_bytes == 40
+
+
+# --- too slow, stopped, as fast as it goes ---
+
+
+def test_a_computer_too_slow_for_real_time_is_told_once():
+    rig = Rig([], cost_s=2 * MAX_CHUNK_S)  # every look at the clock costs more than a chunk of emulated time gains
+    rig.bridge.run(seconds=3.0)
+    assert len(rig.said) == 1
+    assert "behind the clock" in rig.said[0]
+    assert rig.bridge.counts.lag_given_up_s > 1.0
+    assert rig.clock.time_s - rig.line.start_s > 3.0
+
+
+def test_a_short_stall_is_caught_up_in_silence():
+    rig = Rig([(0.0, "open")])
+    rig.bridge.run(seconds=0.1)
+    rig.clock.time_s += 0.9 * GIVE_UP_LAG_S  # the computer was busy elsewhere
+    rig.bridge.run(seconds=0.9 * GIVE_UP_LAG_S + 0.1)
+    assert rig.said == []
+    assert rig.uno.time_s == pytest.approx(rig.clock.time_s - rig.line.start_s, abs=2 * QUIET_SLICE_S)
+
+
+def test_stop_ends_the_loop_after_the_step():
+    rig = Rig([])
+    rig.bridge._after_run = rig.bridge.stop
+    rig.bridge.run(seconds=10)
+    assert 0 < rig.uno.time_s <= QUIET_SLICE_S
+
+
+def test_as_fast_as_it_goes_needs_no_clock_and_paces_bytes_all_the_same():
+    text = bytes(range(10, 110))
+    rig = Rig([(0.0, "open"), (0.0, text)], speed="max")
+    rig.bridge.run(seconds=0.0041)
+    assert rig.line.waits == []
+    assert rig.clock.time_s == rig.line.start_s
+    # 4.1 ms of emulated time carry at most 102 bytes; the greeting comes first, each echo after its byte.
+    assert rig.line.text.startswith(RESET + bytes(byte + 1 for byte in text[:90]))
+    assert len(rig.line.text) <= 2 + 101
+    rig.bridge.run(seconds=0.001)
+    assert rig.line.text == RESET + bytes(byte + 1 for byte in text)
+
+
+@pytest.mark.parametrize("speed", ["real", "max"])
+def test_a_run_ends_on_its_cycle(speed):
+    rig = Rig([(0.0, "open")], speed=speed, image="pulses.hex")
+    rig.bridge.run(seconds=0.0123)
+    assert 0 <= rig.uno.cycle - 0.0123 * CLOCK_HZ < 8
