@@ -18,7 +18,7 @@ from planarm_sim.bridge import Bridge, BridgeCounts, Clock, Line, Speed, WallClo
 from planarm_sim.errors import BridgeError, StoppedError
 from planarm_sim.trace import VcdWriter
 
-__all__ = ["TRACED_PINS", "Emulation", "emulate", "run_board"]
+__all__ = ["TRACED_PINS", "Emulation", "Stop", "emulate", "run_board"]
 
 TRACED_PINS = tuple(pin.name for pin in PINS if pin.name not in ("D0", "D1"))
 """Pins in the waveform file and in the counts: all but the serial line's."""
@@ -89,12 +89,13 @@ def emulate(
             "this system has no pseudo-terminals; use planarm --port sim://, which needs none, or Linux or macOS"
         ) from error
     uno = Uno.from_file(image_path, baud=baud)
-    with PtyLine(link) as line:
+    with _stopped_by_signals() as stop, PtyLine(link) as line:
         announce(line.path)
         return run_board(
             uno,
             line,
             WallClock(),
+            stop,
             vcd=vcd,
             speed=speed,
             seconds=seconds,
@@ -107,6 +108,7 @@ def run_board(
     uno: Uno,
     line: Line,
     clock: Clock,
+    stop: Stop,
     *,
     vcd: str | Path | None = None,
     speed: Speed = "real",
@@ -114,16 +116,15 @@ def run_board(
     reset_on_open: bool = True,
     say: Callable[[str], None],
 ) -> Emulation:
-    """As `emulate`, with a board, a line and a clock of the caller's."""
+    """As `emulate`, with a board, a line, a clock and a way to stop it of the caller's."""
     uno.run(cycles=1)  # compiles the chip, or loads it from the cache: seconds that are nobody's lag
     start_cycle, start_s = uno.cycle, clock.now_s()
     with ExitStack() as stack:
         edges = _EdgeSink(uno, stack.enter_context(_open_vcd(uno, vcd)) if vcd is not None else None)
         bridge = Bridge(uno, line, clock, speed=speed, reset_on_open=reset_on_open, say=say, after_run=edges.take)
-        stack.enter_context(_stopped_by_signals(bridge.stop))
         ended, failed = "stopped", False
         try:
-            bridge.run(seconds)
+            bridge.run(seconds, until=lambda: stop.requested)
         except StoppedError as error:
             ended, failed = str(error), True
         else:
@@ -174,19 +175,29 @@ def _open_vcd(uno: Uno, path: str | Path) -> VcdWriter:
     return VcdWriter(path, TRACED_PINS, [uno.pin(name).level for name in TRACED_PINS], uno.cycle)
 
 
+class Stop:
+    """Whether the end was asked for."""
+
+    def __init__(self) -> None:
+        self.requested = False
+
+    def __call__(self, _number: int = 0, _frame: FrameType | None = None) -> None:
+        """Ask for the end; as a signal's handler, too. Who asks twice is not made to wait."""
+        if self.requested:
+            raise KeyboardInterrupt
+        self.requested = True
+
+
 @contextmanager
-def _stopped_by_signals(stop: Callable[[], None]) -> Iterator[None]:
-    """Let SIGINT and SIGTERM call `stop`; only a program's main thread can."""
+def _stopped_by_signals() -> Iterator[Stop]:
+    """Let SIGINT and SIGTERM ask for the end; only a program's main thread can."""
+    stop = Stop()
     if threading.current_thread() is not threading.main_thread():
-        yield
+        yield stop
         return
-
-    def handle(_number: int, _frame: FrameType | None) -> None:
-        stop()
-
-    before = {number: signal.signal(number, handle) for number in (signal.SIGINT, signal.SIGTERM)}
+    before = {number: signal.signal(number, stop) for number in (signal.SIGINT, signal.SIGTERM)}
     try:
-        yield
+        yield stop
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)

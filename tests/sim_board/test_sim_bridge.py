@@ -1,6 +1,5 @@
 """The bridge between board, line and clock: all of it in emulated time, with a line and a clock made here."""
 
-from collections import deque
 from pathlib import Path
 
 import pytest
@@ -8,79 +7,11 @@ from planarm_sim import Uno
 from planarm_sim.board import CLOCK_HZ
 from planarm_sim.bridge import Bridge
 from planarm_sim.bridge.bridge import BRIDGE_RING_BYTES, GIVE_UP_LAG_S, LIVELY_SLICE_S, MAX_CHUNK_S, QUIET_SLICE_S
+from sim_board.fake_line import FakeClock, FakeLine
 
 DATA = Path(__file__).parent / "data"
 BYTE_S = 40e-6  # ten bits at 250,000 baud
 POWER_UP, RESET = b"R\x01", b"R\x02"  # what echo.S sends first: 'R' and MCUSR
-
-
-class FakeClock:
-    """Moves when someone sleeps, and by `cost_s` at every look, as if computing took that long."""
-
-    def __init__(self, cost_s: float = 0.0) -> None:
-        self.time_s = 0.0
-        self.cost_s = cost_s
-
-    def now_s(self) -> float:
-        self.time_s += self.cost_s
-        return self.time_s
-
-
-class FakeLine:
-    """A host whose acts are laid down by time: at `when` seconds it opens, sends bytes, or closes."""
-
-    def __init__(self, clock: FakeClock, acts: list[tuple[float, str | bytes]], room: int = 10**6) -> None:
-        self.clock = clock
-        self.start_s = 0.0  # the clock's first moment, so that sums of times are exact
-        self.acts = deque(sorted(acts, key=lambda act: act[0]))
-        self.open = False
-        self.inbox = bytearray()  # host to board
-        self.received: list[tuple[float, bytes]] = []  # board to host, with the time
-        self.room = room
-        self.waits: list[float] = []
-        self.most_taken = 0
-
-    def _catch_up(self) -> None:
-        while self.acts and self.acts[0][0] <= self.clock.time_s - self.start_s:
-            _, act = self.acts.popleft()
-            if isinstance(act, bytes):
-                assert self.open, "a host writes to an open line only"
-                self.inbox += act
-            else:
-                self.open = act == "open"
-
-    def is_open(self) -> bool:
-        self._catch_up()
-        return self.open or bool(self.inbox)
-
-    def read(self, most: int) -> bytes:
-        self._catch_up()
-        assert most >= 0
-        data = bytes(self.inbox[:most])
-        del self.inbox[:most]
-        return data
-
-    def write(self, data: bytes) -> int:
-        assert self.open, "nobody is there to read"
-        taken = min(len(data), self.room)
-        self.room -= taken
-        if taken:
-            self.received.append((self.clock.time_s - self.start_s, data[:taken]))
-        return taken
-
-    def wait(self, timeout_s: float, *, for_bytes: bool) -> None:
-        self._catch_up()
-        if for_bytes and self.inbox:
-            return
-        wake = self.clock.time_s + max(timeout_s, 0.0)
-        if for_bytes and self.open and self.acts:
-            wake = min(wake, max(self.start_s + self.acts[0][0], self.clock.time_s))
-        self.waits.append(wake - self.clock.time_s)
-        self.clock.time_s = wake
-
-    @property
-    def text(self) -> bytes:
-        return b"".join(data for _, data in self.received)
 
 
 class Rig:
@@ -220,10 +151,10 @@ def test_a_short_stall_is_caught_up_in_silence():
     assert rig.uno.time_s == pytest.approx(rig.clock.time_s - rig.line.start_s, abs=2 * QUIET_SLICE_S)
 
 
-def test_stop_ends_the_loop_after_the_step():
+def test_a_condition_ends_the_loop_after_the_step():
     rig = Rig([])
-    rig.bridge._after_run = rig.bridge.stop
-    rig.bridge.run(seconds=10)
+    rig.bridge.run(seconds=10, until=lambda: rig.steps > 0)
+    assert rig.steps == 1
     assert 0 < rig.uno.time_s <= QUIET_SLICE_S
 
 

@@ -96,7 +96,6 @@ class Bridge:
         self._opened = self._from_host = self._to_host = self._lost = 0
         self._lag_given_up_s = 0.0
         self._quiet_from_cycle = 0
-        self._stopping = False
         self._anchor_s = clock.now_s()
         self._anchor_cycle = uno.cycle
 
@@ -105,18 +104,14 @@ class Bridge:
         """What passed so far."""
         return BridgeCounts(self._opened, self._from_host, self._to_host, self._lost, self._lag_given_up_s)
 
-    def stop(self) -> None:
-        """End `run` after its present step; may be called from a signal handler."""
-        self._stopping = True
-
-    def run(self, seconds: float | None = None) -> None:
-        """Step until `stop`, or for so many seconds of emulated time.
+    def run(self, seconds: float | None = None, *, until: Callable[[], bool] = lambda: False) -> None:
+        """Step for so many seconds of emulated time, or until `until` says so.
 
         Raises:
             StoppedError: the program came to an end; see `Uno.run`.
         """
         end = None if seconds is None else self._uno.cycle + round(seconds * CLOCK_HZ)
-        while not self._stopping and (end is None or self._uno.cycle < end):
+        while not until() and (end is None or self._uno.cycle < end):
             self.step(end)
 
     def step(self, end_cycle: int | None = None) -> None:

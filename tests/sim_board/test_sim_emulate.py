@@ -1,0 +1,182 @@
+"""`emulate` and `python -m planarm_sim`: a program behind a terminal, until it is stopped."""
+
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+import serial
+from planarm_sim import Uno
+from planarm_sim.__main__ import main, summary
+from planarm_sim.bridge.pty_line import PtyLine
+from planarm_sim.emulate import TRACED_PINS, Stop, emulate, run_board
+from planarm_sim.errors import ImageError
+from planarm_sim.trace import read_vcd
+from sim_board.fake_line import FakeClock, FakeLine
+
+ROOT = Path(__file__).parents[2]
+DATA = Path(__file__).parent / "data"
+LONG_S = 60.0  # a bound for what comes at once; compiling the chip for the first time is the longest
+
+
+def run(image: str, acts=(), **settings):
+    clock = FakeClock()
+    said: list[str] = []
+    uno = Uno.from_hex(DATA / image)
+    return run_board(uno, FakeLine(clock, list(acts)), clock, Stop(), say=said.append, **settings), uno, said
+
+
+# --- the engine, in emulated time ---
+
+
+def test_edges_are_counted_and_carried_to_the_waveform_file(tmp_path):
+    result, uno, _ = run("pulses.hex", vcd=tmp_path / "w.vcd", seconds=0.1)
+    reference = Uno.from_hex(DATA / "pulses.hex")
+    reference.run(cycles=uno.cycle)
+    vcd = read_vcd(tmp_path / "w.vcd")
+    assert set(vcd.edges) == set(TRACED_PINS)
+    for pin in ("D9", "D10"):
+        edges = reference.edges(pin)
+        np.testing.assert_array_equal(vcd.edges[pin][1:], edges)
+        assert result.rising_edges[pin] == int(edges["level"].sum()) == pytest.approx(1000, abs=1)
+    assert set(result.rising_edges) == {"D9", "D10"}
+    assert len(uno.edges("D9")) == 0, "carried away, so that memory does not grow"
+
+
+def test_what_it_did_is_data():
+    result, _, said = run("echo.hex", [(0.0, "open"), (0.01, b"abc")], seconds=0.1)
+    assert result.cycles == pytest.approx(1_600_000, abs=8)
+    assert result.ratio == pytest.approx(1.0, rel=0.05)
+    assert result.ended == "time is up"
+    assert not result.program_failed
+    assert (result.counts.from_host_bytes, result.counts.to_host_bytes) == (3, 5)
+    assert said == []
+    assert summary(result) == (
+        f"time is up; {result.cycles} cycles in 0.10 s ({result.ratio:.2f} x real time); rising edges: none; "
+        "serial: 3 bytes in, 5 out, 0 lost"
+    )
+
+
+def test_a_program_that_ends_ends_the_emulation(tmp_path):
+    result, _, _ = run("echo.hex", [(0.0, "open"), (0.01, b"\x00")], vcd=tmp_path / "w.vcd")
+    assert result.program_failed
+    assert "BREAK" in result.ended
+    assert read_vcd(tmp_path / "w.vcd").end_cycle > 0.01 * 16e6
+
+
+def test_warnings_come_along():
+    result, _, _ = run("unmodelled.hex", seconds=0.01)
+    assert any("TWBR" in warning for warning in result.warnings)
+
+
+def test_asking_for_the_end_ends_it_and_asking_twice_does_not_wait():
+    stop = Stop()
+
+    class StoppingClock(FakeClock):
+        def now_s(self):
+            if self.time_s > 0.05 and not stop.requested:
+                stop()
+            return super().now_s()
+
+    clock = StoppingClock()
+    uno = Uno.from_hex(DATA / "pulses.hex")
+    result = run_board(uno, FakeLine(clock, []), clock, stop, say=[].append)
+    assert result.ended == "stopped"
+    assert uno.time_s == pytest.approx(0.05, abs=0.01)
+    with pytest.raises(KeyboardInterrupt):
+        stop()
+
+
+# --- over a real terminal ---
+
+
+def test_the_terminal_is_announced_first_and_gone_at_the_end(tmp_path):
+    events: list[str] = []
+
+    def announce(path: str) -> None:
+        assert Path(path).is_char_device()
+        assert str((tmp_path / "uno").readlink()) == path
+        events.append(path)
+
+    result = emulate(
+        DATA / "pulses.hex", link=tmp_path / "uno", speed="max", seconds=0.01, announce=announce, say=events.append
+    )
+    assert len(events) == 1
+    assert result.ended == "time is up"
+    assert not (tmp_path / "uno").is_symlink()
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_at_any_moment_ends_it_cleanly(tmp_path, number):
+    before = signal.getsignal(number)
+    result = emulate(
+        DATA / "pulses.hex",
+        link=tmp_path / "uno",
+        announce=lambda _path: signal.raise_signal(number),  # the earliest moment at which a host can know of it
+        say=[].append,
+    )
+    assert result.ended == "stopped"
+    assert not (tmp_path / "uno").is_symlink()
+    assert signal.getsignal(number) == before
+
+
+def test_a_bad_image_is_told_before_any_terminal_is_made(tmp_path):
+    with pytest.raises(ImageError):
+        emulate(tmp_path / "none.hex", link=tmp_path / "uno", announce=[].append, say=[].append)
+    assert not (tmp_path / "uno").is_symlink()
+
+
+@pytest.mark.parametrize("speed", ["real", "max"])
+def test_pyserial_talks_to_the_program(tmp_path, speed):
+    link, wave = tmp_path / "uno", tmp_path / "w.vcd"
+    command = [sys.executable, "-m", "planarm_sim", str(DATA / "echo.hex"), "--link", str(link)]
+    environment = {
+        **os.environ,
+        "PYTHONPATH": os.pathsep.join(str(ROOT / folder) for folder in ("hil_sim", "protocol")),
+    }
+    with subprocess.Popen(
+        [*command, "--vcd", str(wave), "--speed", speed], stdout=subprocess.PIPE, text=True, env=environment
+    ) as process:
+        assert process.stdout is not None
+        path = process.stdout.readline().strip()
+        try:
+            for name in (path, str(link)):  # the second opening finds the board reset
+                with serial.Serial(name, 250_000, timeout=LONG_S, write_timeout=LONG_S) as port:
+                    assert port.read(2) == b"R\x02"
+                    text = bytes(range(5, 250)) * 4
+                    port.write(text)
+                    assert port.read(len(text)) == bytes(byte + 1 for byte in text)
+        finally:
+            process.send_signal(signal.SIGTERM)
+        last = process.stdout.read().splitlines()[-1]
+        assert process.wait(LONG_S) == 0
+    assert last.startswith("stopped; ")
+    assert "serial: 1960 bytes in" in last
+    assert not link.is_symlink()
+    assert read_vcd(wave).end_cycle > 0
+
+
+# --- the front end ---
+
+
+def test_front_end_prints_the_path_then_the_closing_line(capsys):
+    assert main([str(DATA / "pulses.hex"), "--seconds", "0.01", "--speed", "max"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[0].startswith("/dev/")
+    assert lines[-1].startswith("time is up; 1600")
+    assert "rising edges: D9 100, D10 100" in lines[-1]
+
+
+def test_front_end_names_what_is_wrong(capsys, tmp_path):
+    assert main([str(tmp_path / "none.hex")]) == 2
+    assert "none.hex: cannot be read" in capsys.readouterr().err
+
+
+def test_front_end_tells_of_a_failed_program(capsys, monkeypatch):
+    monkeypatch.setattr(PtyLine, "is_open", lambda _self: True)
+    monkeypatch.setattr(PtyLine, "read", lambda _self, _most: b"\x01")
+    assert main([str(DATA / "echo.hex"), "--speed", "max", "--no-reset-on-open"]) == 6
+    assert "undefined opcode" in capsys.readouterr().out
