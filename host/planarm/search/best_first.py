@@ -13,12 +13,12 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from planarm_wire.kernel_cache import kernel
 
 from planarm.search.draw import draw_subset
-from planarm.search.open_list import MADE, NONE, OpenList, make_open_list, pop, push, with_more_room
+from planarm.search.open_list import BUCKET, MADE, NONE, WAITING, OpenList, make_open_list, pop, with_more_room
 from planarm.workspace.proof import PROVED, prove_line
 from planarm.workspace.world import ArmWorld
-from planarm_wire.kernel_cache import kernel
 
 UNSEEN = 0
 START = 255
@@ -99,7 +99,8 @@ def best_first(lattice: Lattice, moves: Moves, rules: Rules, world: ArmWorld, st
     came_by = np.zeros(lattice.shut.size, np.uint8)
     h_cm = _distance_cm(lattice, start, goal)
     g_cm[start], came_by[start] = 0.0, START
-    push(queue.f_cm, queue.node, queue.below, queue.ring, queue.counts, 0, h_cm, start)
+    queue.f_cm[0], queue.node[0], queue.below[0] = h_cm, start, NONE
+    queue.ring[0], queue.counts[MADE], queue.counts[WAITING] = 0, 1, 1
     expanded = 0
     while True:
         last, closed = expand(lattice, moves, rules, world, goal, h_cm, g_cm, came_by, queue)
@@ -123,8 +124,9 @@ def expand(
     queue: OpenList,
 ) -> tuple[int, int]:
     """Expand nodes until the goal is closed; return (goal, or NONE if it cannot be reached, or FULL; nodes closed)."""
-    shut, width, cell_cm = lattice.shut, lattice.width, lattice.cell_cm
+    shut, whole, width, cell_cm = lattice.shut, lattice.whole, lattice.width, lattice.cell_cm
     dx, dy, jump, length_cm = moves.dx, moves.dy, moves.jump, moves.length_cm
+    cover_first, cover = moves.cover_first, moves.cover
     f_cm, queued, below, heap, ring, counts = queue
     goal_x, goal_y = goal % width, goal // width
     order = np.arange(jump.size)
@@ -147,34 +149,32 @@ def expand(
             to_g_cm = from_g_cm + length_cm[k]
             if shut[to] or (came_by[to] != UNSEEN and to_g_cm >= g_cm[to]):
                 continue
-            if rules.proved and not move_is_free(lattice, moves, world, node, k):
-                continue
+            if rules.proved:
+                crossed = cover_first[k]
+                while crossed < cover_first[k + 1] and whole[node + cover[crossed]]:
+                    crossed += 1
+                if crossed < cover_first[k + 1] and not line_is_free(lattice, world, node, to):
+                    continue
             g_cm[to], came_by[to] = to_g_cm, 1 + k
             to_goal_x, to_goal_y = x + dx[k] - goal_x, y + dy[k] - goal_y
             to_f_cm = to_g_cm + cell_cm * sqrt(float(to_goal_x * to_goal_x + to_goal_y * to_goal_y))
             bucket = int((to_f_cm - lowest_f_cm) / cell_cm * BUCKETS_PER_CELL)
-            push(f_cm, queued, below, ring, counts, bucket, to_f_cm, to)
+            place = max(bucket, counts[BUCKET]) & (ring.size - 1)  # below the current bucket only by rounding
+            entry = counts[MADE]
+            f_cm[entry], queued[entry], below[entry] = to_f_cm, to, ring[place]
+            ring[place] = entry
+            counts[MADE] += 1
+            counts[WAITING] += 1
     return FULL, closed
 
 
 @kernel
-def move_is_free(lattice: Lattice, moves: Moves, world: ArmWorld, node: int, move: int) -> bool:
-    """Tell whether all poses of the straight move from `node` are proved free; both directions agree.
-
-    Where all cells crossed are free as a whole nothing else is asked; otherwise the line is proved by bisection.
-    """
-    mixed = False
-    for i in range(moves.cover_first[move], moves.cover_first[move + 1]):
-        if not lattice.whole[node + moves.cover[i]]:
-            mixed = True
-            break
-    if not mixed:
-        return True
-    first, last = node, node + moves.jump[move]
-    if last < first:  # the proof divides the line from its first end: fix which one that is
-        first, last = last, first
-    x0, y0 = node_cm(lattice, first)
-    x1, y1 = node_cm(lattice, last)
+def line_is_free(lattice: Lattice, world: ArmWorld, a: int, b: int) -> bool:
+    """Tell whether all poses of the straight move between two nodes are proved free; both directions agree."""
+    if b < a:  # the proof divides the line from its first end: fix which one that is
+        a, b = b, a
+    x0, y0 = node_cm(lattice, a)
+    x1, y1 = node_cm(lattice, b)
     verdict, _ = prove_line(world, x0, y0, x1, y1)
     return verdict == PROVED
 

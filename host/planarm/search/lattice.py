@@ -1,7 +1,6 @@
 """From a map and a stencil to the flat arrays that the search runs on."""
 
 import numpy as np
-from numpy.typing import NDArray
 
 from planarm.search.best_first import Lattice, Moves
 from planarm.search.stencils import Offsets, cover

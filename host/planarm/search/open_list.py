@@ -5,15 +5,14 @@ bucket. They leave exactly as from one heap over all of them (lowest f first, am
 that are never reached, or whose node was closed meanwhile, are never sorted. The buckets form a ring: with a
 consistent heuristic no entry lies further than two of the longest moves above the one being expanded.
 
-Kernels get the arrays one by one, and each kernel is one flat function: Numba counts references to every array at
-every call, and with small helpers or a tuple of arrays that took most of the search's time.
+The kernel gets the arrays one by one and is one flat function, and entries are pushed where they are made: Numba
+counts references to every array at every call, and with small helpers that took most of the search's time.
 """
 
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-
 from planarm_wire.kernel_cache import kernel
 
 Floats = NDArray[np.float64]
@@ -44,26 +43,22 @@ class OpenList(NamedTuple):
 
 def make_open_list(buckets: float, capacity: int) -> OpenList:
     """Return an empty list with room for `capacity` entries and at least so many buckets."""
-    size = 1 << int(buckets + 2.0).bit_length()
-    f_cm, node, below, heap = np.empty(capacity), *(np.empty(capacity, np.int64) for _ in range(3))
-    return OpenList(f_cm, node, below, heap, np.full(size, NONE, np.int64), np.zeros(4, np.int64))
+    return OpenList(
+        f_cm=np.empty(capacity),
+        node=np.empty(capacity, np.int64),
+        below=np.empty(capacity, np.int64),
+        heap=np.empty(capacity, np.int64),
+        ring=np.full(1 << int(buckets + 2.0).bit_length(), NONE, np.int64),
+        counts=np.zeros(4, np.int64),
+    )
 
 
 def with_more_room(queue: OpenList) -> OpenList:
     """Return a copy of `queue` with twice the capacity; bucket ring and counts are shared."""
-    larger = (np.concatenate((values, np.empty_like(values))) for values in queue[:4])
-    return OpenList(*larger, queue.ring, queue.counts)
-
-
-@kernel
-def push(f_cm: Floats, node: Ints, below: Ints, ring: Ints, counts: Ints, bucket: int, f: float, new: int) -> None:
-    """Add an entry for the node `new` to a bucket not below the current one; there must be room for it."""
-    entry = counts[MADE]
-    place = max(bucket, counts[BUCKET]) & (ring.size - 1)  # below the current one only by rounding
-    f_cm[entry], node[entry], below[entry] = f, new, ring[place]
-    ring[place] = entry
-    counts[MADE] += 1
-    counts[WAITING] += 1
+    larger = make_open_list(0.0, 2 * queue.node.size)
+    for new, old in zip(larger[:4], queue[:4], strict=True):
+        new[: old.size] = old
+    return larger._replace(ring=queue.ring, counts=queue.counts)
 
 
 @kernel

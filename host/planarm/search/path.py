@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 from math import dist, fsum
 
 import numpy as np
@@ -29,7 +30,7 @@ class Path:
         """Return the path through the given way-points, shape (n, 2)."""
         points_cm = np.array(points_cm, dtype=np.float64)
         points_cm.flags.writeable = False
-        length_cm = fsum(dist(a, b) for a, b in zip(points_cm[:-1], points_cm[1:], strict=True))
+        length_cm = fsum(dist(a, b) for a, b in pairwise(points_cm))
         return cls(points_cm, length_cm, elbow)
 
     def corners_cm(self) -> NDArray[np.float64]:

@@ -6,8 +6,9 @@ good paths are broken by it.
 """
 
 from dataclasses import dataclass
+from functools import cache
 from itertools import pairwise
-from math import floor
+from math import floor, isqrt
 from typing import Final
 
 import numpy as np
@@ -39,7 +40,7 @@ class _Disc:
     @property
     def reach(self) -> int:
         """The largest coordinate."""
-        return floor(self.radius_squared**0.5)
+        return isqrt(self.radius_squared)
 
     def holds(self, dx: int, dy: int) -> bool:
         """Tell whether (dx, dy) belongs."""
@@ -89,10 +90,12 @@ def primitive(offsets: Offsets) -> Offsets:
     it out changes no length. Moves that are checked at their ends only may hop over a blocked node, so for those the
     whole stencil has to stay.
     """
-    return offsets[np.gcd(offsets[:, 0], offsets[:, 1]) == 1]
+    shortest: Offsets = offsets[np.gcd(offsets[:, 0], offsets[:, 1]) == 1]
+    return shortest
 
 
-def cover(dx: int, dy: int) -> list[tuple[int, int]]:
+@cache
+def cover(dx: int, dy: int) -> tuple[tuple[int, int], ...]:
     """Return the cells, as offsets from the first, that the straight move from centre (0, 0) to (dx, dy) crosses.
 
     Only cells whose interior is met are listed; their closed squares cover the segment (one that passes exactly
@@ -104,4 +107,4 @@ def cover(dx: int, dy: int) -> list[tuple[int, int]]:
         crossings |= {(2 * k + 1) / (2 * d) for k in range(d)}
     ordered = sorted(crossings)
     middles = [(low + high) / 2.0 for low, high in pairwise(ordered)]
-    return [(floor(t * dx + 0.5), floor(t * dy + 0.5)) for t in middles]
+    return tuple((floor(t * dx + 0.5), floor(t * dy + 0.5)) for t in middles)
