@@ -121,6 +121,16 @@ def test_a_disc_is_proved_exactly_when_the_spare_clearance_exceeds_the_bound():
     assert disc_verdict(build_world(scene, clearance + 1e-9), *tip, rho) == BLOCKED
 
 
+def test_a_disc_that_holds_the_base_is_never_proved():
+    """Joint 1's whole turn is just wide enough for it here, and nothing is near."""
+    world = build_world(make_scene())
+    tip = np.array([0.0, 30.0])
+    theta1 = poses(make_scene(), tip)[0]
+    world = world._replace(theta1_min_rad=theta1 - pi, theta1_max_rad=theta1 + pi, turn_start_rad=theta1 - pi)
+    assert disc_verdict(world, *tip, 30.1) == UNPROVED
+    assert disc_verdict(world, *tip, 10.0) == PROVED
+
+
 @given(st.data())
 @settings(max_examples=50, deadline=None)
 def test_pieces_follow_each_other_from_0_to_1_whatever_is_split(data):
