@@ -1,0 +1,78 @@
+"""Summaries as tables for the terminal."""
+
+# ruff: noqa: PLC0415 - rich is imported by those who print a table
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from numbers import Integral, Real
+from typing import TYPE_CHECKING, Any, Final
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+UNITS: Final = {
+    "cm": "cm",
+    "mm": "mm",
+    "rad": "rad",
+    "deg": "°",
+    "s": "s",
+    "ms": "ms",
+    "us": "µs",
+    "hz": "Hz",
+    "ticks": "ticks",
+    "usteps": "micro-steps",
+    "bytes": "bytes",
+    "percent": "%",
+}
+"""Units by the last word of a key."""
+
+
+def summary_table(summary: Mapping[str, Any], title: str | None = None) -> Table:
+    """Return a two-column table of a summary: names in words, values with the units of their keys.
+
+    The unit is the key's last word, as in `path_length_cm`. Mappings inside are flattened, a list's entries stand on
+    one line with slashes between, None reads "not measured", and truth values "yes" or "no", the latter in red.
+    """
+    from rich import box
+    from rich.table import Table
+
+    table = Table(title=title, box=box.SIMPLE_HEAD, show_header=False, title_justify="left", pad_edge=False)
+    table.add_column(style="dim", no_wrap=True)
+    table.add_column(overflow="fold")
+    for name, value in _rows(summary, ""):
+        table.add_row(name, value)
+    return table
+
+
+def _rows(summary: Mapping[str, Any], prefix: str) -> Iterator[tuple[str, str]]:
+    for key, value in summary.items():
+        words = str(key).split("_")
+        if isinstance(value, Mapping):
+            yield from _rows(value, f"{prefix}{' '.join(words)}: ")
+            continue
+        unit = UNITS.get(words[-1], "") if len(words) > 1 else ""
+        name = " ".join(words[:-1] if unit else words)
+        yield prefix + name, _text(value, unit)
+
+
+def _text(value: Any, unit: str) -> str:  # noqa: ANN401 - a summary holds whatever JSON holds
+    from rich.markup import escape
+
+    if value is None:
+        return "[dim]not measured[/dim]"
+    if isinstance(value, bool):
+        return "yes" if value else "[bold red]no[/bold red]"
+    text = " / ".join(map(_number, value)) if isinstance(value, (list, tuple)) else _number(value)
+    return escape(f"{text} {unit}".strip() if text else "none")
+
+
+def _number(value: object) -> str:
+    """Return whole numbers with thousands apart, others with six digits that count, anything else as it is."""
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if isinstance(value, Integral):
+        return f"{int(value):,}"
+    if isinstance(value, Real):
+        return f"{float(value):.6g}"
+    return str(value)

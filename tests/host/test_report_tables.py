@@ -1,0 +1,51 @@
+"""The summary's table: every entry on a line of its own, with the unit of its key."""
+
+import io
+
+import numpy as np
+from planarm.report.tables import summary_table
+from rich.console import Console
+
+
+def printed(summary: dict) -> list[str]:
+    console = Console(file=io.StringIO(), width=100)
+    console.print(summary_table(summary))
+    return [" ".join(line.split()) for line in console.file.getvalue().splitlines() if line.strip()]
+
+
+def test_units_come_from_the_keys() -> None:
+    assert printed(
+        {
+            "scene": "Table I, case 1",
+            "path_length_cm": 68.984271,
+            "search_ms": 12.0,
+            "net_usteps": [5310, -12],
+            "bytes_sent": 43210,
+            "min_pulse_high_us": np.float64(2.5),
+            "s": 3,
+        }
+    ) == [
+        "scene Table I, case 1",
+        "path length 68.9843 cm",
+        "search 12 ms",
+        "net 5,310 / -12 micro-steps",
+        "bytes sent 43,210",
+        "min pulse high 2.5 µs",
+        "s 3",
+    ]
+
+
+def test_truth_nothing_and_inner_tables() -> None:
+    assert printed(
+        {"certificate_ok": True, "ok": False, "max_jitter_ticks": None, "empty": [], "link": {"baud": 250000}}
+    ) == [
+        "certificate ok yes",
+        "ok no",
+        "max jitter not measured",
+        "empty none",
+        "link: baud 250,000",
+    ]
+
+
+def test_brackets_in_values_are_no_markup() -> None:
+    assert printed({"port": "[red]COM3[/red]"}) == ["port [red]COM3[/red]"]
