@@ -48,7 +48,9 @@ POSES_CM = np.array([[[0, 0], [2, 1], [3, 0.5]], [[0, 0], [1, 2], [2, 3]], [[0, 
 
 def draw(path: Path, **changes: object) -> None:
     values = {
-        "free_map": MAP,
+        "x_cm": MAP.x_cm,
+        "y_cm": MAP.y_cm,
+        "region": MAP.region,
         "obstacles": OBSTACLES,
         "path_points_cm": PATH_CM,
         "poses_cm": POSES_CM,
@@ -102,8 +104,8 @@ def test_the_legend_names_what_is_there_and_nothing_else(figures: list[Figure], 
         "start",
         "goal",
     ]
-    only_free = Map(MAP.x_cm, MAP.y_cm, np.zeros_like(MAP.region))
-    draw(tmp_path / "free.png", free_map=only_free, obstacles=(), tip_curve_cm=PATH_CM)
+    only_free = np.zeros_like(MAP.region)
+    draw(tmp_path / "free.png", region=only_free, obstacles=(), tip_curve_cm=PATH_CM)
     labels = [text.get_text() for text in figures[1].legends[0].get_texts()]
     assert labels == ["free", "arm, fading in towards the goal", "path, corners blended", "start", "goal"]
 
@@ -185,8 +187,8 @@ def test_the_same_data_give_the_same_file(tmp_path: Path) -> None:
         ({"path_points_cm": [1.0, 2.0]}, "path_points_cm has the shape"),
         ({"poses_cm": PATH_CM}, "poses_cm has the shape"),
         ({"tip_curve_cm": np.zeros((3, 3))}, "tip_curve_cm has the shape"),
-        ({"free_map": Map(MAP.x_cm, MAP.y_cm, MAP.region.T)}, r"expected \(rows, columns\) = \(8, 18\)"),
-        ({"free_map": Map(MAP.x_cm, MAP.y_cm, MAP.region + np.uint8(4))}, "holds the code 8, known are 0 to 4"),
+        ({"region": MAP.region.T}, r"expected \(rows, columns\) = \(8, 18\)"),
+        ({"region": MAP.region + np.uint8(4)}, "holds the code 8, known are 0 to 4"),
     ],
 )
 def test_arrays_that_do_not_fit_are_named(changes: dict, message: str, tmp_path: Path) -> None:

@@ -37,20 +37,10 @@ REGIONS: Final = (
 OBSTACLE_COLOUR: Final = "#8A3B00"
 
 
-class RegionMap(Protocol):
-    """The part of a free map that is drawn; `planarm.workspace` has one, three arrays will do."""
-
-    @property
-    def x_cm(self) -> NDArray[np.float64]:
-        """Node coordinates, equally spaced, shape (columns,)."""
-
-    @property
-    def y_cm(self) -> NDArray[np.float64]:
-        """Node coordinates, equally spaced, shape (rows,)."""
-
-    @property
-    def region(self) -> NDArray[np.uint8]:
-        """Region code of each node, shape (rows, columns)."""
+class _Map(NamedTuple):
+    x_cm: NDArray[np.float64]
+    y_cm: NDArray[np.float64]
+    region: NDArray[np.uint8]
 
 
 class CircleOutline(Protocol):
@@ -76,7 +66,9 @@ class PolygonOutline(Protocol):
 def draw_workspace(
     path_png: Path | str,
     *,
-    free_map: RegionMap,
+    x_cm: ArrayLike,
+    y_cm: ArrayLike,
+    region: ArrayLike,
     obstacles: Sequence[CircleOutline | PolygonOutline],
     path_points_cm: ArrayLike,
     poses_cm: ArrayLike,
@@ -88,8 +80,10 @@ def draw_workspace(
 
     Args:
         path_png: the file to write.
-        free_map: the regions; a cell is centred on its node.
-        obstacles: circles and polygons, outlined as they are.
+        x_cm: the map's node coordinates, equally spaced, shape (columns,); a cell is centred on its node.
+        y_cm: the same, shape (rows,).
+        region: region code of each node, shape (rows, columns).
+        obstacles: circles (`center_cm`, `radius_cm`) and polygons (`vertices_cm`), outlined as they are.
         path_points_cm: way-points from start to goal, shape (n, 2), n >= 1.
         poses_cm: a handful of poses, from start to goal, each the base, the joints and the end effector: shape
             (k, joints + 1, 2). They fade in on the way to the goal.
@@ -100,6 +94,7 @@ def draw_workspace(
     Raises:
         ValueError: the arrays do not have these shapes, or a region code is unknown.
     """
+    free_map = _checked_map(x_cm, y_cm, region)
     points_cm = _array(path_points_cm, "path_points_cm", (None, 2))
     arms_cm = _array(poses_cm, "poses_cm", (None, None, 2))
     figure = new_figure(9.0, _height_in(free_map, 9.0))
@@ -125,31 +120,36 @@ def _array(values: ArrayLike, name: str, shape: tuple[int | None, ...]) -> NDArr
     return array
 
 
-def _extent_cm(free_map: RegionMap) -> tuple[float, float, float, float]:
+def _checked_map(x_cm: ArrayLike, y_cm: ArrayLike, region: ArrayLike) -> _Map:
+    free_map = _Map(_array(x_cm, "x_cm", (None,)), _array(y_cm, "y_cm", (None,)), np.asarray(region, dtype=np.uint8))
+    expected = (len(free_map.y_cm), len(free_map.x_cm))
+    if free_map.region.shape != expected:
+        raise ValueError(f"region has the shape {free_map.region.shape}, expected (rows, columns) = {expected}")
+    highest = int(free_map.region.max(initial=0))
+    if highest >= len(REGIONS):
+        raise ValueError(f"region holds the code {highest}, known are 0 to {len(REGIONS) - 1}")
+    return free_map
+
+
+def _extent_cm(free_map: _Map) -> tuple[float, float, float, float]:
     """Return left, right, bottom and top of the map: half a cell beyond its outer nodes."""
     x_cm, y_cm = free_map.x_cm, free_map.y_cm
     half_x, half_y = (0.5 * float(nodes[1] - nodes[0]) if len(nodes) > 1 else 0.5 for nodes in (x_cm, y_cm))
     return float(x_cm[0]) - half_x, float(x_cm[-1]) + half_x, float(y_cm[0]) - half_y, float(y_cm[-1]) + half_y
 
 
-def _height_in(free_map: RegionMap, width_in: float) -> float:
+def _height_in(free_map: _Map, width_in: float) -> float:
     left, right, bottom, top = _extent_cm(free_map)
     return (width_in - 0.7) * (top - bottom) / (right - left) + 1.7
 
 
-def _draw_regions(axes: Axes, free_map: RegionMap) -> list[Artist]:
+def _draw_regions(axes: Axes, free_map: _Map) -> list[Artist]:
     from matplotlib.colors import BoundaryNorm, ListedColormap
     from matplotlib.patches import Patch
 
-    region = np.asarray(free_map.region)
-    expected = (len(free_map.y_cm), len(free_map.x_cm))
-    if region.shape != expected:
-        raise ValueError(f"free_map.region has the shape {region.shape}, expected (rows, columns) = {expected}")
-    codes = [int(code) for code in np.unique(region)]
-    if codes and codes[-1] >= len(REGIONS):
-        raise ValueError(f"free_map.region holds the code {codes[-1]}, known are 0 to {len(REGIONS) - 1}")
+    codes = [int(code) for code in np.unique(free_map.region)]
     axes.imshow(
-        region,
+        free_map.region,
         origin="lower",
         extent=_extent_cm(free_map),
         interpolation="nearest",
@@ -212,7 +212,7 @@ def _draw_ends(axes: Axes, points_cm: NDArray[np.float64]) -> list[Artist]:
     return [*start, *goal]
 
 
-def _finish(axes: Axes, free_map: RegionMap, arms_cm: NDArray[np.float64]) -> None:
+def _finish(axes: Axes, free_map: _Map, arms_cm: NDArray[np.float64]) -> None:
     """Equal scales, the whole map and the whole arm in view, axes in cm."""
     left, right, bottom, top = _extent_cm(free_map)
     if arms_cm.size:
