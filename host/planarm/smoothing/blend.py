@@ -1,0 +1,140 @@
+"""Round a path's corners by parabolas that are proved free.
+
+A corner between two legs is cut by the quadratic Bezier curve that leaves the legs at equal distances d from it;
+its control point is the corner. With unit vectors u and v along the legs it comes within d |v - u| / 4 of the corner, so
+a tolerance for that distance gives the largest d. Each leg is shared by the corners at its two ends, half to each.
+A curve that cannot be proved free is tried with half of d, and so on; a corner left sharp is a stop.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from planarm.smoothing.smooth_path import Floats, SmoothPath, TwoLinks, angle_between, joint_angles
+from planarm.workspace.proof import PROVED, prove_curve
+
+if TYPE_CHECKING:
+    from planarm.search.path import Path
+    from planarm.workspace.free_map import FreeMap
+
+__all__ = ["SmoothPath", "blend_corners"]
+
+DEFAULT_TOLERANCE_CM = 1.0
+"""The tip leaves a corner by at most this, unless told otherwise."""
+
+SMALLEST_LEG_CM = 0.01
+"""A corner that leaves room for shorter legs only is left sharp: running through it would be nearly a stop anyway."""
+
+STRAIGHT = 1e-9
+"""Sine of the largest turn between legs that count as one."""
+
+TURNING_BACK = -0.99
+"""Cosine of the turn beyond which the tip goes back where it came from: a stop, so that the corner is reached."""
+
+
+def blend_corners(path: Path, free_map: FreeMap, tolerance_cm: float = DEFAULT_TOLERANCE_CM) -> SmoothPath:
+    """Return the path with its corners rounded as much as tolerance and obstacles allow.
+
+    Args:
+        path: way-points of the tip, with straight moves between them that are free.
+        free_map: where the tip may be; its margin is kept.
+        tolerance_cm: largest distance of the rounded path from a corner.
+
+    Raises:
+        ValueError: the path has no point, or one that is no number; or the tolerance is not above 0.
+    """
+    if not tolerance_cm > 0.0:
+        raise ValueError(f"the tolerance is {tolerance_cm} cm; it must be above 0")
+    corners = way_points(path.points_cm)
+    world = free_map.world
+    links = TwoLinks(world.l1_cm, world.l2_cm, (world.base_x_cm, world.base_y_cm), free_map.elbow)
+    legs = np.diff(corners, axis=0)
+    lengths = np.hypot(legs[:, 0], legs[:, 1])
+    units = legs / lengths[:, None]
+    cuts = np.zeros(len(corners))
+    for k in range(1, len(corners) - 1):
+        largest = 0.5 * min(lengths[k - 1], lengths[k])
+        cuts[k] = _proved_cut(corners[k], units[k - 1], units[k], largest, tolerance_cm, free_map)
+    return _assemble(links, corners, units, lengths, cuts, world.turn_start_rad)
+
+
+def way_points(points_cm: Floats) -> Floats:
+    """Return the points without repeated ones and without those in the middle of a straight run, shape (n, 2)."""
+    points = np.asarray(points_cm, np.float64)
+    if points.ndim != 2 or points.shape[1] != 2 or not len(points) or not np.isfinite(points).all():
+        raise ValueError(f"a path is one or more finite points (x, y), not an array of shape {points.shape}: {points}")
+    kept = [points[0]]
+    for point in points[1:]:
+        if (point == kept[-1]).all():
+            continue
+        if len(kept) > 1 and _runs_on(kept[-1] - kept[-2], point - kept[-1]):
+            kept[-1] = point
+        else:
+            kept.append(point)
+    return np.array(kept)
+
+
+def _runs_on(a: Floats, b: Floats) -> bool:
+    """Tell whether leg b goes on straight after leg a."""
+    sizes = np.hypot(*a) * np.hypot(*b)
+    return bool(abs(a[0] * b[1] - a[1] * b[0]) <= STRAIGHT * sizes and a @ b > 0.0)
+
+
+def _proved_cut(
+    corner: Floats, u: Floats, v: Floats, largest_cm: float, tolerance_cm: float, free_map: FreeMap
+) -> float:
+    """Return the distance from the corner at which a proved parabola leaves the legs; 0 for a stop."""
+    if u @ v < TURNING_BACK:
+        return 0.0
+    cut = min(largest_cm, 4.0 * tolerance_cm / float(np.hypot(*(v - u))))
+    while cut >= SMALLEST_LEG_CM:
+        verdict, _ = prove_curve(free_map.world, *(corner - cut * u), *corner, *(corner + cut * v))
+        if verdict == PROVED:
+            return cut
+        cut *= 0.5
+    return 0.0
+
+
+def _assemble(
+    links: TwoLinks, corners: Floats, units: Floats, lengths: Floats, cuts: Floats, turn_start_rad: float
+) -> SmoothPath:
+    """Return the path made of what the cuts leave of each leg, and a parabola at each cut corner."""
+    sizes, slopes, bends, tips, stops = [], [], [], [corners[0]], []
+    for k, length in enumerate(lengths):
+        rest = length - cuts[k] - cuts[k + 1]
+        if rest > STRAIGHT * length:
+            sizes.append(rest)
+            slopes.append(units[k])
+            bends.append(np.zeros(2))
+            tips.append(corners[k + 1] - cuts[k + 1] * units[k])
+        if cuts[k + 1] > 0.0:
+            sizes.append(2.0 * cuts[k + 1])
+            slopes.append(units[k])
+            bends.append((units[k + 1] - units[k]) / (2.0 * cuts[k + 1]))
+            tips.append(corners[k + 1] + cuts[k + 1] * units[k + 1])
+        elif k + 1 < len(lengths):
+            stops.append(len(sizes))
+    borders = np.concatenate([[0.0], np.cumsum(sizes)])
+    tips_cm = np.array(tips)
+    return SmoothPath(
+        links,
+        borders,
+        tips_cm,
+        np.array(slopes).reshape(-1, 2),
+        np.array(bends).reshape(-1, 2),
+        _directions_rad(links, tips_cm, turn_start_rad),
+        borders[stops],
+    )
+
+
+def _directions_rad(links: TwoLinks, tips_cm: Floats, turn_start_rad: float) -> Floats:
+    """Return the tip's direction at each border, without jumps, so that theta1 starts in the turn of its limits."""
+    to_tips = tips_cm - links.base_cm
+    turns = angle_between(to_tips[:-1], to_tips[1:])
+    first = np.arctan2(to_tips[:1, 1], to_tips[:1, 0])
+    theta1 = joint_angles(links, tips_cm[:1], first)[0, 0]
+    if np.isfinite(theta1):
+        first -= 2.0 * np.pi * np.floor((theta1 - turn_start_rad) / (2.0 * np.pi))
+    return np.concatenate([first, first + np.cumsum(turns)])

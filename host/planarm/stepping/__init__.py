@@ -1,0 +1,1 @@
+"""Motion to steps: exact step times, their compression into segments, and the certificate of the result."""

@@ -1,0 +1,20 @@
+"""What is streamed: segments, and where the joints stand before them."""
+
+from dataclasses import dataclass
+
+from planarm_wire.messages import Segment
+
+
+@dataclass(frozen=True, slots=True)
+class SegmentPlan:
+    """A motion as the firmware executes it.
+
+    Attributes:
+        segments: in order; the last one is flagged. Empty when nothing moves.
+        duration_ticks: sum of the segments' durations.
+        start_usteps: each joint's position before the motion; a joint stands at usteps / usteps_per_rad.
+    """
+
+    segments: tuple[Segment, ...]
+    duration_ticks: int
+    start_usteps: tuple[int, ...]

@@ -1,0 +1,68 @@
+"""Compress a step train into the wire's segments, and check the result by expanding it again."""
+
+import numpy as np
+from planarm_wire.messages import MAX_SEGMENT_TICKS, Move, Segment
+
+from planarm.errors import TimingError
+from planarm.stepping.expand import expand
+from planarm.stepping.greedy import ADD, COUNT, FIRST, INTERVAL, cut
+from planarm.stepping.plan import SegmentPlan
+from planarm.stepping.train import StepTrain, Ticks, require_steppable
+from planarm.stepping.windows import tolerance_ticks, windows_of
+
+__all__ = ["SegmentPlan", "compress", "expand"]
+
+
+def compress(train: StepTrain) -> SegmentPlan:
+    """Return segments that make the train's steps: counts and directions exactly, times within their tolerance.
+
+    The tolerance is `planarm.stepping.windows.tolerance_ticks`; no interval gets shorter than the train's shortest.
+
+    Raises:
+        TimingError: steps are too close to each other for the firmware.
+    """
+    require_steppable(train)
+    if train.duration_ticks == 0:
+        return SegmentPlan((), 0, train.start_usteps)
+    windows = windows_of(train)
+    joint_of = np.repeat(np.arange(len(train.steps)), np.diff(windows.first))
+    order = joint_of[np.argsort(np.concatenate([joint.ticks for joint in train.steps]), kind="stable")]
+    room = len(order) + 2 + train.duration_ticks // MAX_SEGMENT_TICKS  # a step each, and rests
+    ends, runs = np.zeros(room, np.int64), np.zeros((room, len(train.steps), 4), np.int64)
+    count = cut(windows, order, train.duration_ticks, ends, runs)
+    ends, runs = ends[:count], runs[:count]
+    plan = SegmentPlan(_segments(train, ends, runs), train.duration_ticks, train.start_usteps)
+    _require_same_steps(train, expand(plan))
+    return plan
+
+
+def _segments(train: StepTrain, ends: Ticks, runs: Ticks) -> tuple[Segment, ...]:
+    """Return the wire's form of the runs; a run's direction is that of its first step in the train."""
+    following = [0] * len(train.steps)
+    segments = []
+    durations = np.diff(ends, prepend=0)
+    for k, duration in enumerate(durations.tolist()):
+        moves = []
+        for j, run in enumerate(runs[k].tolist()):
+            count = run[COUNT]
+            positive = count > 0 and train.steps[j].directions[following[j]] > 0
+            moves.append(Move(2 * count + int(positive), run[FIRST], run[INTERVAL], run[ADD]))
+            following[j] += count
+        is_last = k == len(durations) - 1
+        segments.append(Segment(2 * duration + int(is_last), tuple(moves)))
+    return tuple(segments)
+
+
+def _require_same_steps(wanted: StepTrain, made: StepTrain) -> None:
+    """Check that the expanded segments are the train's steps; compression is never trusted."""
+    if made.duration_ticks != wanted.duration_ticks:
+        raise TimingError(f"the segments last {made.duration_ticks} ticks, the motion {wanted.duration_ticks}")
+    for number, (steps, expanded) in enumerate(zip(wanted.steps, made.steps, strict=True), start=1):
+        if not np.array_equal(steps.directions, expanded.directions):
+            raise TimingError(f"the segments do not make the steps of joint {number} in number and direction")
+        moved = np.abs(expanded.ticks - steps.ticks) - tolerance_ticks(steps)
+        if len(moved) and moved.max() > 0:
+            n = int(moved.argmax())
+            raise TimingError(
+                f"the segments make step {n} of joint {number} at tick {expanded.ticks[n]} instead of {steps.ticks[n]}"
+            )

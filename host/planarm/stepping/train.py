@@ -1,0 +1,106 @@
+"""Steps on their ticks, and the joints' lattice of micro-steps."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from planarm_wire.messages import MIN_DIR_SETUP_TICKS, MIN_INTERVAL_TICKS, TICKS_HZ
+
+from planarm.errors import TimingError
+from planarm.scene import JointSpec
+
+Ticks = NDArray[np.int64]
+Directions = NDArray[np.int8]
+Floats = NDArray[np.float64]
+
+MIN_REVERSAL_TICKS = MIN_INTERVAL_TICKS + MIN_DIR_SETUP_TICKS
+"""Least time between two steps of one joint in opposite directions: DIR changes in between and has its setup time."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class JointSteps:
+    """One joint's steps.
+
+    Attributes:
+        ticks: moment of each step in ticks of 62.5 ns from the motion's start, ascending, int64[n].
+        directions: +1 or -1 for each, int8[n].
+    """
+
+    ticks: Ticks
+    directions: Directions
+
+    @property
+    def net_usteps(self) -> int:
+        """Signed sum of the steps."""
+        return int(self.directions.sum(dtype=np.int64))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class StepTrain:
+    """The steps of all joints over one motion.
+
+    Attributes:
+        start_usteps: each joint's position before the motion; a joint stands at usteps / usteps_per_rad.
+        steps: one entry a joint.
+        duration_ticks: length of the motion, later than every step; 0 when nothing moves.
+    """
+
+    start_usteps: tuple[int, ...]
+    steps: tuple[JointSteps, ...]
+    duration_ticks: int
+
+    @property
+    def end_usteps(self) -> tuple[int, ...]:
+        """Each joint's position after the motion."""
+        return tuple(start + joint.net_usteps for start, joint in zip(self.start_usteps, self.steps, strict=True))
+
+
+def to_usteps(q_rad: ArrayLike, usteps_per_rad: ArrayLike) -> NDArray[np.int64]:
+    """Return the nearest micro-step of each joint angle; half-way values go up."""
+    nearest: NDArray[np.int64] = np.floor(np.asarray(q_rad) * np.asarray(usteps_per_rad) + 0.5).astype(np.int64)
+    return nearest
+
+
+def require_steppable(train: StepTrain, joints: Sequence[JointSpec] | None = None) -> None:
+    """Check that the firmware can make the steps.
+
+    Raises:
+        TimingError: a step of a joint follows too soon after the one before it, or after the motion's start.
+    """
+    for number, steps in enumerate(train.steps, start=1):
+        if not len(steps.ticks):
+            continue
+        reverses = np.diff(steps.directions) != 0
+        room = np.diff(steps.ticks) - np.where(reverses, MIN_REVERSAL_TICKS, MIN_INTERVAL_TICKS)
+        if len(room) and room.min() < 0:
+            raise TimingError(_too_fast(number, steps, int(room.argmin()), joints))
+        if steps.ticks[0] < MIN_DIR_SETUP_TICKS:
+            raise TimingError(
+                f"joint {number} would step {steps.ticks[0]} ticks after the motion's start; its DIR line needs "
+                f"{MIN_DIR_SETUP_TICKS}: let the motion start later"
+            )
+        if steps.ticks[-1] >= train.duration_ticks:
+            raise TimingError(
+                f"joint {number} steps at tick {steps.ticks[-1]}, the motion ends at {train.duration_ticks}"
+            )
+
+
+def _too_fast(number: int, steps: JointSteps, i: int, joints: Sequence[JointSpec] | None) -> str:
+    """Tell where a joint is too fast and what to do about it."""
+    gap = int(steps.ticks[i + 1] - steps.ticks[i])
+    at_s = steps.ticks[i] / TICKS_HZ
+    if steps.directions[i] != steps.directions[i + 1]:
+        return (
+            f"joint {number} would reverse within {gap} ticks at {at_s:.6f} s; reversing takes {MIN_REVERSAL_TICKS}: "
+            f"lower joints[{number}].max_acceleration_deg_s2"
+        )
+    largest = TICKS_HZ / MIN_INTERVAL_TICKS
+    advice = f"lower joints[{number}].max_speed_deg_s"
+    if joints is not None:
+        fastest_deg_s = np.degrees(largest / joints[number - 1].usteps_per_rad)
+        advice += f" to at most {fastest_deg_s:.6g}, or its microsteps or gear_ratio"
+    return (
+        f"joint {number} would step after {gap} ticks ({TICKS_HZ / max(gap, 1):.0f} steps/s) at {at_s:.6f} s; the "
+        f"firmware needs {MIN_INTERVAL_TICKS} ({largest:.0f} steps/s): {advice}"
+    )
