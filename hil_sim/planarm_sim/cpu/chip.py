@@ -1,17 +1,30 @@
 """The ATmega328P as one object: arrays in, compiled kernel, logs out.
 
 `Chip` is the whole interface between the chip and the board around it. Time is counted in clock cycles since
-power-up and never goes back, not even over a reset.
+power-up and never goes back, not even over a reset. A chip starts with its first instruction at cycle 0: the
+start-up delay that the fuses select is not part of the count.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import Enum, IntFlag
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
+
+from planarm_sim.cpu import layout as at
+from planarm_sim.cpu import queues, service
+from planarm_sim.cpu import registers as reg
+from planarm_sim.cpu.decode import FLASH_BYTES, decode
+from planarm_sim.cpu.dispatch import run
+from planarm_sim.errors import ImageError, PinError, UsageError
+from planarm_sim.peripherals.eeprom import EEPROM_BYTES
+from planarm_sim.peripherals.ports import drive_from_outside, refresh_port
+from planarm_sim.peripherals.timer_registers import power_up_timers
+from planarm_sim.peripherals.usart import RXEN, UDRE, plan_receiver
+from planarm_sim.peripherals.watchdog import WDE, plan_watchdog
 
 
 class StopCause(Enum):
@@ -32,20 +45,51 @@ class ResetCause(IntFlag):
     WATCHDOG = 8
 
 
-EDGE_DTYPE = np.dtype([("cycle", np.int64), ("pin", np.uint8), ("level", np.uint8)])
-TX_DTYPE = np.dtype([("cycle", np.int64), ("byte", np.uint16), ("bit_cycles", np.int32)])
+class Parity(Enum):
+    """Parity of a serial frame."""
+
+    NONE = "none"
+    EVEN = "even"
+    ODD = "odd"
+
+
+EDGE_DTYPE: Final = np.dtype([("cycle", np.int64), ("pin", np.uint8), ("level", np.uint8)])
+"""An edge of an output pin: the cycle of the electrical change, the pin, its new level."""
+TX_DTYPE: Final = np.dtype([("cycle", np.int64), ("byte", np.uint16), ("bit_cycles", np.int32)])
+"""A frame sent: the cycle at which its last stop bit ends, the character, cycles per bit."""
+
+PINS: Final = 24
+SRAM_BYTES: Final = reg.SRAM_END - reg.SRAM_START
+_BOOT_START_WORD = 0x3F00  # BOOTSZ = 11, 256 words, as on an Arduino Uno (datasheet, table 27-13)
+_STOPS = {
+    service.REACHED: StopCause.REACHED,
+    service.AT_BREAK: StopCause.BREAK,
+    service.AT_BAD_OPCODE: StopCause.BAD_OPCODE,
+    service.ASLEEP_FOR_EVER: StopCause.ASLEEP,
+}
 
 
 @dataclass(frozen=True, slots=True)
 class Snapshot:
     """Everything that decides the chip's further run; opaque, made by `Chip.snapshot`."""
 
-    arrays: tuple[NDArray[Any], ...]
+    state: NDArray[np.int64]
+    sram: NDArray[np.uint8]
+    eeprom: NDArray[np.uint8]
+    flash: NDArray[np.uint8]
+    code: NDArray[np.int64]
+    queues: tuple[NDArray[np.int64], ...]
 
 
 @dataclass(frozen=True, slots=True)
 class FirstTouch:
-    """The first access of the program to a register of a part that is not modelled."""
+    """The first access of the program to a register of a part that is not modelled.
+
+    Attributes:
+        address: in the data space; 0x900 and above is beyond the chip's memory.
+        register: the datasheet's name, or the address in hexadecimal where there is no register.
+        pc: word address of the instruction.
+    """
 
     address: int
     register: str
@@ -56,50 +100,269 @@ class Chip:
     """ATmega328P. Pins are numbered port * 8 + bit with B = 0, C = 1, D = 2 (PB1 is 1, PD1 is 17)."""
 
     def __init__(self, flash: bytes) -> None:
-        """Load a program image of up to 32 KiB and power up; the rest of the flash is erased (0xFF)."""
-        raise NotImplementedError
+        """Load a program image of up to 32 KiB and power up; the rest of the flash is erased (0xFF).
+
+        Raises:
+            ImageError: the image is larger than the flash.
+        """
+        if len(flash) > FLASH_BYTES:
+            raise ImageError(f"the program has {len(flash)} bytes, the ATmega328P's flash {FLASH_BYTES}")
+        self._flash = np.full(FLASH_BYTES, 0xFF, dtype=np.uint8)
+        self._flash[: len(flash)] = np.frombuffer(flash, dtype=np.uint8)
+        self._code = decode(self._flash)
+        self._sram = np.zeros(SRAM_BYTES, dtype=np.uint8)
+        self._eeprom = np.full(EEPROM_BYTES, 0xFF, dtype=np.uint8)
+        state = np.zeros(at.QUEUES, dtype=np.int64)
+        state[at.BOOT_START] = _BOOT_START_WORD
+        nothing = np.empty(0, dtype=np.int64)
+        self._state = queues.allocate(state, (nothing,) * len(queues.ALL))
+        self.reset(ResetCause.POWER_ON)
+
+    # --- Time ----------------------------------------------------------------------------------------------
 
     @property
     def cycle(self) -> int:
         """Clock cycles since power-up."""
-        raise NotImplementedError
+        return int(self._state[at.CYCLE])
 
     def run_to(self, cycle: int) -> StopCause:
-        """Run whole instructions until `self.cycle >= cycle`, or until the program stops earlier."""
-        raise NotImplementedError
+        """Run whole instructions until `self.cycle >= cycle`, or until the program stops earlier.
+
+        After BREAK a further call goes on behind it; at an undefined opcode it stops again, with `pc` on it.
+        """
+        while True:
+            cause = int(run(self._state, self._sram, self._eeprom, self._code, self._flash, cycle))
+            if cause in _STOPS:
+                return _STOPS[cause]
+            if cause == service.LOG_FULL:
+                self._state = queues.allocate(self._state, queues.contents(self._state))
+            elif cause == service.RESET_WANTED:
+                self.reset(ResetCause(int(self._state[at.RESET_REQUEST])))
+            else:
+                self._self_program()
 
     def reset(self, cause: ResetCause = ResetCause.POWER_ON) -> None:
-        """Reset the chip now. SRAM keeps its contents except at power-on; queued serial input stays queued."""
-        raise NotImplementedError
+        """Reset the chip now. SRAM keeps its contents except at power-on; queued serial input stays queued.
 
-    def push_rx(self, start_cycle: int, bit_cycles: float, byte: int) -> None:
-        """Queue a serial frame whose start bit falls on RXD at `start_cycle`, in order of time."""
-        raise NotImplementedError
+        What drives pins from outside goes on driving them, edges of pins that the reset lets go of are logged.
+        """
+        old = self._state
+        now = int(old[at.CYCLE])
+        causes = 0 if cause == ResetCause.POWER_ON else int(old[reg.MCUSR])
+        st = np.zeros_like(old)
+        st[at.CONSTANTS :] = old[at.CONSTANTS :]
+        kept = (at.CYCLE, at.TX_BASE, at.TX_COUNT, at.TX_LIMIT, at.EDGE_BASE, at.EDGE_COUNT, at.EDGE_LIMIT)
+        kept += (at.RX_BASE, at.RX_HEAD, at.RX_TAIL, at.IN_BASE, at.IN_HEAD, at.IN_TAIL, at.BOOT_START)
+        kept += (at.DUE_INPUT, at.OUTSIDE_ADDRESS, at.OUTSIDE_PC, *range(at.LEVEL, at.PIPE))
+        kept += tuple(range(at.TOUCHED, at.TOUCHED + 256))
+        st[list(kept)] = old[list(kept)]
+        st[at.OVERRIDE : at.EXTERNAL] = 0
+        st[at.DUE : at.DUE + at.DUE_SOURCES] = at.NEVER
+        st[at.DUE_INPUT] = old[at.DUE_INPUT] if st[at.IN_HEAD] < st[at.IN_TAIL] else at.NEVER
+        st[at.SP] = reg.SRAM_END - 1
+        st[reg.MCUSR] = causes | int(cause)
+        st[reg.UCSR0A] = UDRE
+        st[reg.UCSR0C] = 0x06
+        st[[at.PRESCALER_01, at.PRESCALER_2, at.BAUD_ORIGIN, at.RX_READY, at.WDT_ORIGIN]] = now
+        self._state = st
+        power_up_timers(st)
+        if cause == ResetCause.POWER_ON:
+            self._sram[:] = 0
+        if st[reg.MCUSR] & ResetCause.WATCHDOG:
+            st[reg.WDTCSR] = WDE
+            plan_watchdog(st, now)
+        for port in range(3):
+            refresh_port(st, port, now)
+
+    # --- Serial line -----------------------------------------------------------------------------------------
+
+    def push_rx(
+        self,
+        start_cycle: int,
+        bit_cycles: float,
+        byte: int,
+        *,
+        data_bits: int = 8,
+        parity: Parity = Parity.NONE,
+        stop_level: int = 1,
+    ) -> None:
+        """Queue a serial frame whose start bit falls on RXD at `start_cycle`.
+
+        Args:
+            start_cycle: not before now and not before the start of the last queued frame.
+            bit_cycles: cycles per bit of the far end's own clock.
+            byte: the character, least significant bit first on the line.
+            data_bits: 5 to 9.
+            parity: of the far end's frame.
+            stop_level: 0 makes a broken frame.
+
+        Raises:
+            UsageError: the start lies in the past, or a value is out of its range.
+        """
+        if not 5 <= data_bits <= 9 or not 0 <= byte < 1 << data_bits or not bit_cycles >= 1:
+            raise UsageError(
+                f"no serial frame: character {byte} in {data_bits} bits (5 to 9) at {bit_cycles} cycles per bit (1 or more)"
+            )
+        st = self._state
+        tail = int(st[at.RX_TAIL])
+        earliest = self.cycle
+        if tail > st[at.RX_HEAD]:
+            earliest = max(earliest, int(st[st[at.RX_BASE] + (tail - 1) * at.RX_WIDTH]) + 1)
+        if start_cycle < earliest:
+            raise UsageError(f"a serial frame cannot start at cycle {start_cycle}: the earliest is {earliest}")
+        bits = byte << 1
+        count = data_bits + 1
+        if parity is not Parity.NONE:
+            bits |= (byte.bit_count() + (parity is Parity.ODD)) % 2 << count
+            count += 1
+        bits |= stop_level << count
+        entry = (start_cycle, round(bit_cycles * (1 << at.BIT_FRACTION)), bits, count + 1)
+        self._state = st = queues.append(st, queues.RX, entry)
+        if st[reg.UCSR0B] & RXEN and not st[at.RX_ACTIVE] and st[at.DUE_RX] == at.NEVER:
+            plan_receiver(st)
 
     def drain_tx(self) -> NDArray[Any]:
-        """Return and forget the frames that ended on TXD: TX_DTYPE, `cycle` is the end of the stop bit."""
-        raise NotImplementedError
+        """Return and forget the frames that ended on TXD, TX_DTYPE in order of time."""
+        st = self._state
+        count, base = int(st[at.TX_COUNT]), int(st[at.TX_BASE])
+        raw = st[base : base + count * at.TX_WIDTH].reshape(count, at.TX_WIDTH)
+        result = np.empty(count, dtype=TX_DTYPE)
+        for column, name in enumerate(("cycle", "byte", "bit_cycles")):
+            result[name] = raw[:, column]
+        st[at.TX_COUNT] = 0
+        return result
+
+    # --- Pins ------------------------------------------------------------------------------------------------
 
     def drain_edges(self) -> NDArray[Any]:
-        """Return and forget every edge of an output pin, EDGE_DTYPE in order of time."""
-        raise NotImplementedError
+        """Return and forget every edge of an output pin, EDGE_DTYPE in order of time.
+
+        The bits of a frame on TXD are not among them; `drain_tx` tells them all by cycle and bit time.
+        """
+        st = self._state
+        count, base = int(st[at.EDGE_COUNT]), int(st[at.EDGE_BASE])
+        raw = st[base : base + count]
+        result = np.empty(count, dtype=EDGE_DTYPE)
+        result["cycle"] = raw >> 8
+        result["pin"] = (raw >> 1) & 0x7F
+        result["level"] = raw & 1
+        st[at.EDGE_COUNT] = 0
+        return result
 
     def drive_pin(self, pin: int, level: int | None, cycle: int | None = None) -> None:
-        """Drive a pin from outside at `cycle` (None: now); `level` None lets go of it."""
-        raise NotImplementedError
+        """Drive a pin from outside at `cycle` (None: now); `level` None lets go of it.
+
+        Raises:
+            PinError: no such pin, or a level other than 0 and 1.
+            UsageError: `cycle` lies in the past, or before a drive already queued.
+        """
+        self._check_pin(pin)
+        if level not in (None, 0, 1):
+            raise PinError(f"level {level} of pin {pin}: only 0, 1 and None (let go) can be driven")
+        kind = 2 if level is None else level
+        st = self._state
+        queued = int(st[at.IN_TAIL]) > int(st[at.IN_HEAD])
+        if cycle is None and not queued:
+            drive_from_outside(st, pin, kind, self.cycle)
+            return
+        moment = self.cycle if cycle is None else cycle
+        last = int(st[st[at.IN_BASE] + st[at.IN_TAIL] - 1]) >> 8 if queued else self.cycle
+        if moment < last:
+            raise UsageError(f"pin {pin} cannot be driven at cycle {moment}: the earliest is {last}")
+        self._state = queues.append(st, queues.DRIVES, ((moment << 8) | (pin << 2) | kind,))
+        if not queued:
+            self._state[at.DUE_INPUT] = moment
 
     def pin_level(self, pin: int) -> int:
         """Return the electrical level of a pin now, 0 or 1; a floating pin reads 0."""
-        raise NotImplementedError
+        self._check_pin(pin)
+        return int(self._state[at.LEVEL + (pin >> 3)] >> (pin & 7)) & 1
+
+    # --- Whole state -------------------------------------------------------------------------------------------
 
     def snapshot(self) -> Snapshot:
         """Copy everything that decides the further run, logs not yet drained included."""
-        raise NotImplementedError
+        st = self._state
+        state = st[: at.STATE_WORDS].copy()
+        entries = queues.contents(st)
+        return Snapshot(state, self._sram.copy(), self._eeprom.copy(), self._flash, self._code, entries)
 
     def restore(self, snapshot: Snapshot) -> None:
-        """Go back to `snapshot`; the same run follows."""
-        raise NotImplementedError
+        """Go back to `snapshot`, of this chip or of another with any program; the same run follows."""
+        self._state = queues.allocate(np.pad(snapshot.state, (0, at.QUEUES - at.STATE_WORDS)), snapshot.queues)
+        self._sram[:] = snapshot.sram
+        self._eeprom[:] = snapshot.eeprom
+        self._flash, self._code = snapshot.flash, snapshot.code
 
     def unmodelled(self) -> tuple[FirstTouch, ...]:
         """Return the registers of parts that are not modelled which the program touched, by address."""
-        raise NotImplementedError
+        st = self._state
+        touched = np.nonzero(st[at.TOUCHED : at.TOUCHED + 256])[0]
+        touches = [
+            FirstTouch(int(a), reg.NAMES.get(int(a), f"0x{a:02X}"), int(st[at.TOUCHED + a]) - 1) for a in touched
+        ]
+        if st[at.OUTSIDE_ADDRESS]:
+            outside = int(st[at.OUTSIDE_ADDRESS]) - 1
+            touches.append(FirstTouch(outside, f"0x{outside:04X}", int(st[at.OUTSIDE_PC])))
+        return tuple(touches)
+
+    # --- Views for tests and debuggers -----------------------------------------------------------------------------
+
+    @property
+    def pc(self) -> int:
+        """Word address of the next instruction."""
+        return int(self._state[at.PC])
+
+    @pc.setter
+    def pc(self, value: int) -> None:
+        self._state[at.PC] = value & 0x3FFF
+
+    @property
+    def sreg(self) -> int:
+        """Status register."""
+        return int(self._state[at.SREG_BITS])
+
+    @sreg.setter
+    def sreg(self, value: int) -> None:
+        self._state[at.SREG_BITS] = value & 0xFF
+
+    @property
+    def sp(self) -> int:
+        """Stack pointer."""
+        return int(self._state[at.SP])
+
+    @sp.setter
+    def sp(self, value: int) -> None:
+        self._state[at.SP] = value & 0xFFFF
+
+    @property
+    def registers(self) -> NDArray[np.int64]:
+        """The 32 general registers, a live view."""
+        return self._state[:32]
+
+    @property
+    def sram(self) -> NDArray[np.uint8]:
+        """The SRAM from data address 0x100 on, a live view."""
+        return self._sram
+
+    @property
+    def eeprom(self) -> NDArray[np.uint8]:
+        """The EEPROM, a live view."""
+        return self._eeprom
+
+    @property
+    def flash(self) -> NDArray[np.uint8]:
+        """The program memory; not to be written to."""
+        return self._flash
+
+    def _check_pin(self, pin: int) -> None:
+        if not 0 <= pin < PINS:
+            raise PinError(f"pin {pin}: the ATmega328P's pins are numbered 0 to {PINS - 1} (port * 8 + bit)")
+
+    def _self_program(self) -> None:
+        """SPM: flash programming by the program itself is not modelled; note it and go on behind."""
+        st = self._state
+        if st[at.TOUCHED + reg.SPMCSR] == 0:
+            st[at.TOUCHED + reg.SPMCSR] = st[at.PC] + 1
+        st[at.PC] += 1
+        st[at.CYCLE] += 1

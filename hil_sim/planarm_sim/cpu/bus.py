@@ -1,0 +1,241 @@
+"""The data space as the CPU reads and writes it: registers, I/O, extended I/O, SRAM.
+
+An access happens in the last clock cycle of its instruction. A read sees the state at the start of that cycle,
+a write takes effect at its end; what is due until then happens first. CYCLE holds the end of the instruction.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from planarm_wire.kernel_cache import kernel
+
+from planarm_sim.cpu.events import process_events
+from planarm_sim.cpu.layout import (
+    CYCLE,
+    HORIZON,
+    IVCE_UNTIL,
+    OUTSIDE_ADDRESS,
+    OUTSIDE_PC,
+    PC,
+    SP,
+    SREG_BITS,
+    TIMER0,
+    TIMER2,
+    TOUCHED,
+    Bytes,
+    State,
+)
+from planarm_sim.cpu.registers import (
+    EEARH,
+    EEARL,
+    EECR,
+    EEDR,
+    EICRA,
+    EIFR,
+    EIMSK,
+    GPIOR0,
+    GPIOR1,
+    GPIOR2,
+    GTCCR,
+    MCUCR,
+    MCUSR,
+    OCR0B,
+    OCR1BH,
+    OCR2B,
+    PCICR,
+    PCIFR,
+    PCMSK0,
+    PCMSK1,
+    PCMSK2,
+    PINB,
+    PIND,
+    PORTD,
+    READS_PLAIN,
+    SMCR,
+    SPL,
+    SRAM_END,
+    SRAM_START,
+    SREG,
+    TCCR0A,
+    TCCR1A,
+    TCCR2A,
+    TIFR0,
+    TIFR2,
+    TIMSK0,
+    TIMSK2,
+    UBRR0H,
+    UCSR0A,
+    UDR0,
+    WDTCSR,
+)
+from planarm_sim.peripherals.eeprom import read_control, write_control
+from planarm_sim.peripherals.ports import PUD, read_pins, refresh_port, write_port
+from planarm_sim.peripherals.timer_registers import (
+    read_timer1,
+    read_timer8,
+    read_timer_flags,
+    write_prescaler_control,
+    write_timer1,
+    write_timer8,
+    write_timer_flags,
+    write_timer_mask,
+)
+from planarm_sim.peripherals.usart import read_data, write_data, write_usart
+from planarm_sim.peripherals.watchdog import write_watchdog
+
+IVSEL, IVCE = 1 << 1, 1 << 0  # MCUCR
+IVCE_CYCLES = 4
+
+# Bits that can be written, where not all of them can.
+WRITABLE = np.full(256, 0xFF, dtype=np.int64)
+WRITABLE[[EIMSK, EICRA, PCICR, PCMSK1, SMCR, EEARH]] = (3, 15, 7, 0x7F, 15, 3)
+
+
+@kernel
+def touch(st: State, address: int) -> None:
+    """Note the first access to a register whose part is not modelled."""
+    if st[TOUCHED + address] == 0:
+        st[TOUCHED + address] = st[PC] + 1
+
+
+@kernel
+def touch_outside(st: State, address: int) -> None:
+    """Note the first access beyond the end of the SRAM."""
+    if st[OUTSIDE_ADDRESS] == 0:
+        st[OUTSIDE_ADDRESS] = address + 1
+        st[OUTSIDE_PC] = st[PC]
+
+
+@kernel
+def read_data_space(st: State, sram: Bytes, eeprom: Bytes, address: int) -> int:
+    """Read one byte; beyond the SRAM there is nothing, which reads as 0 and is noted."""
+    if address < SRAM_START:
+        return read_io(st, eeprom, address)
+    if address < SRAM_END:
+        return int(sram[address - SRAM_START])
+    touch_outside(st, address)
+    return 0
+
+
+@kernel
+def write_data_space(st: State, sram: Bytes, eeprom: Bytes, address: int, value: int) -> None:
+    """Write one byte."""
+    if address < 32:
+        st[address] = value
+    elif address < SRAM_START:
+        write_io(st, eeprom, address, value)
+    elif address < SRAM_END:
+        sram[address - SRAM_START] = value
+    else:
+        touch_outside(st, address)
+
+
+@kernel
+def read_io(st: State, eeprom: Bytes, address: int) -> int:
+    """Read a general or I/O register (address below 256)."""
+    if READS_PLAIN[address]:
+        return int(st[address])
+    if SPL <= address <= SREG:
+        if address == SREG:
+            return int(st[SREG_BITS])
+        return int(st[SP] & 0xFF if address == SPL else st[SP] >> 8)
+    cycle = st[CYCLE] - 1
+    process_events(st, eeprom, cycle)
+    if PINB <= address <= PIND:
+        return read_pins(st, (address - PINB) // 3, cycle)
+    if TCCR1A <= address <= OCR1BH:
+        return read_timer1(st, address, cycle)
+    if TCCR0A <= address <= OCR0B:
+        return read_timer8(st, TIMER0, address, cycle)
+    if TCCR2A <= address <= OCR2B:
+        return read_timer8(st, TIMER2, address, cycle)
+    if TIFR0 <= address <= TIFR2:
+        return read_timer_flags(st, address, cycle)
+    if address == UDR0:
+        return read_data(st)
+    if UCSR0A <= address <= UBRR0H or address in (PCIFR, EIFR, WDTCSR, GTCCR):
+        return int(st[address])
+    if address == EECR:
+        return read_control(st, cycle)
+    touch(st, address)
+    return int(st[address])
+
+
+@kernel
+def write_io(st: State, eeprom: Bytes, address: int, value: int) -> None:
+    """Write an I/O register (address 32 to 255)."""
+    cycle = st[CYCLE]
+    if SPL <= address <= SREG:
+        write_cpu_register(st, address, value)
+        return
+    process_events(st, eeprom, cycle)
+    if PINB <= address <= PORTD:
+        write_port(st, address, value, cycle)
+    elif TCCR1A <= address <= OCR1BH:
+        write_timer1(st, address, value, cycle)
+    elif address == UDR0:
+        write_data(st, value, cycle)
+        st[HORIZON] = 0
+    elif TCCR0A <= address <= OCR0B:
+        write_timer8(st, TIMER0, address, value, cycle)
+    elif TCCR2A <= address <= OCR2B:
+        write_timer8(st, TIMER2, address, value, cycle)
+    elif address in (GPIOR0, GPIOR1, GPIOR2):
+        st[address] = value
+    else:
+        write_rare_io(st, eeprom, address, value, cycle)
+        st[HORIZON] = 0
+
+
+@kernel
+def write_cpu_register(st: State, address: int, value: int) -> None:
+    """Write SPL, SPH or SREG."""
+    if address == SREG:
+        st[SREG_BITS] = value
+    elif address == SPL:
+        st[SP] = (st[SP] & 0xFF00) | value
+    else:
+        st[SP] = (st[SP] & 0x00FF) | (value << 8)
+
+
+@kernel
+def write_rare_io(st: State, eeprom: Bytes, address: int, value: int, cycle: int) -> None:
+    """Write a register whose effect the CPU loop must look at before its next instruction."""
+    if TIFR0 <= address <= TIFR2:
+        write_timer_flags(st, address, value, cycle)
+    elif TIMSK0 <= address <= TIMSK2:
+        write_timer_mask(st, address, value, cycle)
+    elif UCSR0A <= address <= UBRR0H:
+        write_usart(st, address, value, cycle)
+    elif address in (PCIFR, EIFR):
+        st[address] &= ~value
+    elif address in (EIMSK, PCICR, EICRA, PCMSK0, PCMSK1, PCMSK2, SMCR, EEDR, EEARL, EEARH):
+        st[address] = value & WRITABLE[address]
+    elif address == MCUSR:
+        st[address] &= value
+    elif address == EECR:
+        write_control(st, eeprom, value, cycle)
+    elif address == WDTCSR:
+        write_watchdog(st, value, cycle)
+    elif address == GTCCR:
+        write_prescaler_control(st, value, cycle)
+    elif address == MCUCR:
+        write_mcu_control(st, value, cycle)
+    else:
+        touch(st, address)
+        st[address] = value
+
+
+@kernel
+def write_mcu_control(st: State, value: int, cycle: int) -> None:
+    """Write MCUCR: PUD at any time, IVSEL only within four cycles of IVCE (datasheet, 12.5)."""
+    before = st[MCUCR]
+    ivsel = before & IVSEL
+    if value & IVCE:
+        st[IVCE_UNTIL] = cycle + IVCE_CYCLES
+    elif cycle <= st[IVCE_UNTIL]:
+        ivsel = value & IVSEL
+    st[MCUCR] = (value & PUD) | ivsel
+    if (before ^ value) & PUD:
+        for port in range(3):
+            refresh_port(st, port, cycle)

@@ -1,0 +1,160 @@
+"""Layout of the one int64 array that holds the chip's state, shared by every kernel.
+
+Words 0 to 255 are the low data space: the 32 general registers and the I/O registers as last written (a
+register whose value depends on time is computed when it is read). State that no program sees follows, then
+four queues whose place and size stand in the state itself, so that Python can grow them.
+
+SRAM, EEPROM and flash are byte arrays of their own: three quarters of a snapshot would be zeros otherwise.
+"""
+
+from __future__ import annotations
+
+from typing import TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+State: TypeAlias = NDArray[np.int64]
+Bytes: TypeAlias = NDArray[np.uint8]
+
+NEVER = 1 << 62
+"""A cycle that does not come (9,000 years at 16 MHz)."""
+
+# --- CPU ---------------------------------------------------------------------------------------------------
+(
+    PC,  # word address
+    CYCLE,  # clock cycles since power-up
+    SP,  # stack pointer, 16 bits
+    SREG_BITS,
+    HORIZON,  # the first cycle at which the CPU loop has to look at anything beside instructions
+    IRQ_EARLIEST,  # no interrupt is taken before this cycle (one instruction after SEI and RETI)
+    ASLEEP,  # 0 awake, else 1 + sleep mode (SM2:0)
+    RESET_REQUEST,  # bits of MCUSR of a reset that a peripheral asks for
+    BOOT_START,  # word address of the boot section, where vectors go when IVSEL is set
+    IVCE_UNTIL,  # last cycle at which IVSEL may be changed
+    OUTSIDE_ADDRESS,  # first data address beyond the chip's memory that was used, plus 1
+    OUTSIDE_PC,
+    # --- Watchdog, EEPROM ---
+    WDT_ORIGIN,
+    WDT_CHANGE_UNTIL,
+    EE_WRITE_UNTIL,
+    EE_BUSY_ADDRESS,
+    EE_BUSY_DATA,
+    EE_BUSY_MODE,
+    # --- Shared prescalers of the timers ---
+    PRESCALER_01,  # cycle of the last reset of the prescaler of timers 0 and 1
+    PRESCALER_2,
+    HELD_01,  # 1 while TSM holds the prescaler in reset
+    HELD_2,
+    TEMP,  # high byte on its way into or out of a 16-bit register
+    # --- USART0 ---
+    BAUD_ORIGIN,  # cycle at which the baud rate divider was last loaded by a write to UBRR0L
+    TX_BUSY,
+    TX_SHIFT,
+    TX_BUFFER,
+    TX_BIT_CYCLES,
+    RX_ACTIVE,  # 1 between the detection of a start bit and the middle of the stop bit
+    RX_FIRST_SAMPLE,  # cycle of sample 1 of the frame being received
+    RX_READY,  # cycle from which the receiver looks for a start bit
+    RX_COUNT,  # bytes in the receive buffer, 0 to 2
+    RX_ENTRY_0,
+    RX_ENTRY_1,
+    RX_WAITING,  # 1 when a whole frame waits in the shift register
+    RX_ENTRY_SHIFT,
+    RX_OVERRUN,
+    RX_LAST,
+    # --- Input pipeline: what a pin does to peripherals, PIPE_DELAY cycles later ---
+    PIPE_HEAD,
+    PIPE_COUNT,
+    # --- Queues: first word, used entries, limit in entries ---
+    TX_BASE,
+    TX_COUNT,
+    TX_LIMIT,
+    EDGE_BASE,
+    EDGE_COUNT,
+    EDGE_LIMIT,
+    RX_BASE,
+    RX_HEAD,
+    RX_TAIL,
+    IN_BASE,
+    IN_HEAD,
+    IN_TAIL,
+    _CPU_END,
+) = range(256, 256 + 53)
+
+# --- When each source of events is due ----------------------------------------------------------------------
+(DUE_TIMER0, DUE_TIMER1, DUE_TIMER2, DUE_TX, DUE_RX, DUE_PIPE, DUE_INPUT, DUE_CAPTURE, DUE_EEPROM, DUE_WATCHDOG) = (
+    range(_CPU_END, _CPU_END + 10)
+)
+DUE, DUE_SOURCES = DUE_TIMER0, 10
+
+# --- Ports, one word each for B, C, D ------------------------------------------------------------------------
+LEVEL = DUE + DUE_SOURCES  # electrical level of the pins now
+LEVEL_BEFORE = LEVEL + 3  # their level before the last change
+CHANGED_AT = LEVEL + 6  # cycle of the last change
+DIRECTION = LEVEL + 9  # 1 where the chip drives the pin
+OVERRIDE = LEVEL + 12  # 1 where a peripheral's output replaces PORTx
+OVERRIDE_LEVEL = LEVEL + 15
+FORCE_OUT = LEVEL + 18  # 1 where a peripheral overrides DDRx
+FORCE_IN = LEVEL + 21
+EXTERNAL = LEVEL + 24  # 1 where something outside drives the pin
+EXTERNAL_LEVEL = LEVEL + 27
+PIPE = LEVEL + 30  # PIPE_SLOTS pairs of (cycle, effects)
+PIPE_SLOTS = 16
+PIPE_DELAY = 3
+
+# --- Timers: three blocks of the same fields -----------------------------------------------------------------
+(
+    F_SYNC,  # cycle up to which the counter is worked out
+    F_COUNT,
+    F_DOWN,  # 1 while counting down (dual slope)
+    F_SHIFT,  # log2 of the prescaler's ratio, or CLOCK_STOPPED, CLOCK_RISING, CLOCK_FALLING
+    F_OCR_A,  # the value compared with
+    F_OCR_B,
+    F_BUFFER_A,  # the value as written, copied to F_OCR_x at once or at TOP or BOTTOM
+    F_BUFFER_B,
+    F_ICR,
+    F_MAX,
+    F_SLOPE,
+    F_TOP_SOURCE,
+    F_TOP_FIXED,
+    F_LOAD_AT,
+    F_OVERFLOW_AT,
+    F_COM_A,  # 0 not connected, 1 toggle, 2 and 3 as COMnx1:0
+    F_COM_B,
+    F_LATCH_A,  # the OCnx register
+    F_LATCH_B,
+    F_BLOCKED,  # 1 when a write to TCNTn blocks matches at the next timer clock
+    F_PRESCALER,  # index of the prescaler's origin in the state
+    F_HELD,
+    F_DUE,
+    F_TIFR,
+    F_TIMSK,
+    F_TCCRA,
+    F_TCCRB,
+    F_PIN_A,
+    F_PIN_B,
+    _F_END,
+) = range(30)
+# Values of F_SHIFT below zero, F_SLOPE, F_TOP_SOURCE, F_LOAD_AT and F_OVERFLOW_AT.
+CLOCK_STOPPED, CLOCK_FALLING, CLOCK_RISING = -1, -2, -3
+SLOPE_COUNT, SLOPE_FAST, SLOPE_DUAL = 0, 1, 2
+TOP_FIXED, TOP_OCR_A, TOP_ICR = 0, 1, 2
+AT_ONCE, AT_TOP, AT_BOTTOM, AT_MAX = 0, 1, 2, 3
+
+TIMER0 = PIPE + 2 * PIPE_SLOTS
+TIMER1 = TIMER0 + _F_END
+TIMER2 = TIMER1 + _F_END
+
+TOUCHED = TIMER2 + _F_END
+"""256 words, one per data address: 1 + PC of the first access when its part is not modelled, else 0."""
+STATE_WORDS = TOUCHED + 256
+"""What a snapshot has to copy of the state array; the queues are behind it."""
+CONSTANTS = STATE_WORDS
+"""256 words that hold 0 to 255: the second register of instructions with a constant."""
+QUEUES = CONSTANTS + 256
+
+TX_WIDTH, RX_WIDTH = 3, 4
+"""Words per entry: sent frames (cycle, data, bit cycles), received ones (start, bit cycles * 2^16, bits, count)."""
+BIT_FRACTION = 16
+"""Fraction bits of the far end's bit time."""
