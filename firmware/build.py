@@ -1,10 +1,11 @@
 """Builds the firmware, directly and through PlatformIO, and keeps the released image.
 
-    python firmware/build.py avr [--out DIR]   hex and elf by avr-gcc
-    python firmware/build.py pio               the same through `pio run`, without PlatformIO's registry
-    python firmware/build.py native            the core as a shared library for this computer, for tests
-    python firmware/build.py release           writes release/uno.hex and release/uno.json
-    python firmware/build.py check             proves that both builds equal release/uno.hex, byte for byte
+    python firmware/build.py avr        hex and elf by avr-gcc
+    python firmware/build.py pio        the same through `pio run`, without PlatformIO's registry
+    python firmware/build.py native     the core as a shared library for this computer, for tests
+    python firmware/build.py test       the core's own tests through `pio test`, sanitizers on
+    python firmware/build.py release    writes release/uno.hex and release/uno.json
+    python firmware/build.py check      proves that both builds equal release/uno.hex, byte for byte
 
 Sources and flags are those of platformio.ini, in PlatformIO's order, so that both builds agree. Nothing in an image
 depends on the time or the place of its build. Needs the standard library only; exits 1 with the reason on failure.
@@ -21,6 +22,7 @@ import re
 import shutil
 import subprocess
 import sys
+from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
@@ -111,14 +113,14 @@ def find_pio() -> str:
     return found
 
 
-def run_pio(*arguments: str) -> str:
-    """Run PlatformIO on this project with the stand-in store of offline/ instead of its registry."""
+def run_pio(out: Path, *arguments: str) -> str:
+    """Run PlatformIO on this project, with the stand-in store of offline/ for its registry; it writes to `out`."""
     offline = FIRMWARE / "offline"
     return run(
-        [find_pio(), *arguments],
+        [find_pio(), *arguments, "-d", str(FIRMWARE)],
         timeout_s=PIO_TIMEOUT_S,
-        PLATFORMIO_CORE_DIR=str(BUILD / "pio-core"),
-        PLATFORMIO_WORKSPACE_DIR=str(BUILD / "pio"),
+        PLATFORMIO_CORE_DIR=str(out / "pio-core"),
+        PLATFORMIO_WORKSPACE_DIR=str(out / "pio"),
         PLATFORMIO_PLATFORMS_DIR=str(offline / "platforms"),
         PLATFORMIO_PACKAGES_DIR=str(offline / "packages"),
         PLATFORMIO_SETTING_ENABLE_TELEMETRY="No",
@@ -127,10 +129,15 @@ def run_pio(*arguments: str) -> str:
     )
 
 
-def build_pio() -> Path:
+def build_pio(out: Path) -> Path:
     """Build with `pio run`; return the hex."""
-    run_pio("run", "-d", str(FIRMWARE), "-e", "uno")
-    return BUILD / "pio" / "build" / "uno" / "program.hex"
+    run_pio(out, "run", "-e", "uno")
+    return out / "pio" / "build" / "uno" / "program.hex"
+
+
+def test_pio(out: Path) -> str:
+    """Run the core's own tests with `pio test`; return what they said."""
+    return run_pio(out, "test", "-e", "native")
 
 
 def build_native(out: Path) -> Path:
@@ -165,12 +172,13 @@ def describe(image: Path) -> Release:
     )
 
 
-def release() -> None:
-    """Build and write the released image with its description."""
-    image = build_avr(BUILD)
+def release(out: Path) -> Path:
+    """Build and write the released image with its description; return it."""
+    image = build_avr(out)
     RELEASE_HEX.parent.mkdir(exist_ok=True)
     RELEASE_HEX.write_bytes(image.read_bytes())
     RELEASE_JSON.write_text(json.dumps(asdict(describe(image)), indent=2) + "\n", encoding="utf-8")
+    return RELEASE_HEX
 
 
 def require_released(image: Path, how: str) -> None:
@@ -187,36 +195,39 @@ def require_released(image: Path, how: str) -> None:
     raise BuildError(f"{how}: {image} differs from {RELEASE_HEX}; {reason}")
 
 
-def check() -> None:
+def check(out: Path) -> str:
     """Prove that both builds give the released image, and that its description is true."""
-    image = build_avr(BUILD)
+    image = build_avr(out)
     require_released(image, "avr-gcc")
     told = Release(**json.loads(RELEASE_JSON.read_text(encoding="utf-8")))
     if told != describe(image):
         raise BuildError(f"{RELEASE_JSON} says {told}, measured {describe(image)}; run firmware/build.py release")
-    require_released(build_pio(), "pio run")
+    require_released(build_pio(out), "pio run")
+    return f"{RELEASE_HEX} is what both builds give: {told}"
+
+
+COMMANDS: dict[str, Callable[[Path], Path | str]] = {
+    "avr": build_avr,
+    "pio": build_pio,
+    "native": build_native,
+    "test": test_pio,
+    "release": release,
+    "check": check,
+}
 
 
 def main() -> int:
     """Carry out one command; return the exit code."""
     parser = argparse.ArgumentParser(description="Builds planarm's firmware.")
-    parser.add_argument("command", choices=("avr", "pio", "native", "release", "check"))
-    parser.add_argument("--out", type=Path, default=BUILD, help="folder for the results of avr and native")
+    parser.add_argument("command", choices=COMMANDS)
+    parser.add_argument("--out", type=Path, default=BUILD, help="folder for everything that is built")
     arguments = parser.parse_args()
-    out = arguments.out.resolve()
-    commands = {
-        "avr": lambda: build_avr(out),
-        "pio": build_pio,
-        "native": lambda: build_native(out),
-        "release": release,
-        "check": check,
-    }
     try:
-        result = commands[arguments.command]()
+        result = COMMANDS[arguments.command](arguments.out.resolve())
     except BuildError as error:
-        print(f"firmware/build.py {arguments.command}: {error}", file=sys.stderr)
+        sys.stderr.write(f"firmware/build.py {arguments.command}: {error}\n")
         return 1
-    print(result or f"{RELEASE_HEX}: ok")
+    sys.stdout.write(f"{result}\n")
     return 0
 
 

@@ -1,11 +1,14 @@
-// The 32-bit tick clock: the timer's 16 bits, carried on by the main program. It wraps after 268 s; times are compared by
-// their difference, as int32_t.
+// The 32-bit tick clock: the timer's 16 bits, carried on by the main program. It wraps after 268 s; times are
+// compared by their difference, as int32_t.
 #pragma once
 
 #include <stdint.h>
 
 namespace planarm {
 namespace clock {
+
+// Sets the clock to `ticks`, whose low 16 bits must be the timer's. For start-up.
+void reset(uint32_t ticks);
 
 // The 32-bit time of a reading of the timer. Right as long as one is made in every 65,536 ticks (4.1 ms).
 uint32_t extend(uint16_t counter);

@@ -19,8 +19,8 @@ constexpr uint8_t BYTES_A_PASS = 8;
 FrameReceiver receiver;
 uint8_t reply_bytes[reply::MAX_ENCODED];
 
-// Spreads counts that follow each other over all 32 bits; every step can be undone, so different counts stay different.
-// The multiplier is 2^32 over the golden ratio, made odd.
+// Spreads counts that follow each other over all 32 bits; every step can be undone, so different counts stay
+// different. The multiplier is 2^32 over the golden ratio, made odd.
 uint32_t mix(uint32_t count) {
     uint32_t mixed = (count + 1) * 0x9E3779B1u;
     mixed ^= mixed >> 15;
@@ -62,8 +62,9 @@ void reply() {
 
 }  // namespace
 
-void set_up(uint32_t boot_count) {
+void set_up(uint32_t boot_count, uint32_t now_ticks) {
     receiver = FrameReceiver();
+    clock::reset(now_ticks);
     motion::reset();
     supervisor::reset();
     session::reset();

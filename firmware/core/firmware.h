@@ -6,8 +6,9 @@
 namespace planarm {
 namespace firmware {
 
-// `boot_count` differs at every boot. Interrupts are still off.
-void set_up(uint32_t boot_count);
+// `boot_count` differs at every boot; the low 16 bits of `now_ticks` are the timer's, read less than 65,536
+// ticks ago. Interrupts are still off.
+void set_up(uint32_t boot_count, uint32_t now_ticks);
 
 // One bounded pass: motion first, then a few received bytes or one segment, then a reply.
 void pass();

@@ -1,4 +1,5 @@
-// Turns the byte stream into checked frames: unstuffing, both checksums, resynchronisation at every delimiter.
+// Turns the byte stream into checked frames: unstuffing, both checksums, resynchronisation at every
+// delimiter.
 #pragma once
 
 #include <stdint.h>
@@ -19,7 +20,8 @@ class FrameReceiver {
   public:
     enum class Event : uint8_t { NONE, FRAME, DAMAGED };
 
-    // Takes one byte of the line. DAMAGED is told once for each delimiter that ends something other than a good frame.
+    // Takes one byte of the line. DAMAGED is told once for each delimiter that ends something other than a
+    // good frame.
     Event receive(uint8_t byte);
 
     // The frame of the last FRAME event.

@@ -8,7 +8,8 @@ namespace motion {
 
 namespace {
 
-// A segment is prepared this long before its start at the earliest, so that all times in the step engine compare rightly.
+// A segment is prepared this long before its start at the earliest, so that all times in the step engine
+// compare rightly.
 constexpr int32_t PREPARE_AHEAD_TICKS = 0x100000;
 
 static_assert((wire::QUEUE_SLOTS & (wire::QUEUE_SLOTS - 1)) == 0, "slot indices wrap by a mask");
@@ -46,7 +47,8 @@ void prepare_next(uint32_t now_ticks) {
     ++prepared;
 }
 
-// Takes executed segments off the queue. True when the last of them ended the motion's data, as far as received.
+// Takes executed segments off the queue. True when the last of them ended the motion's data, as far as
+// received.
 bool retire(uint32_t now_ticks) {
     while (prepared != 0) {
         const uint32_t end_ticks = oldest_start_ticks + slot(0).duration_ticks;
@@ -138,7 +140,8 @@ Ledger ledger() {
         if (!has_come(end_ticks, ledger.ticks)) break;
         ++ledger.executed_segments;
     }
-    for (uint8_t joint = 0; joint < wire::JOINTS; ++joint) ledger.position_usteps[joint] = position.usteps[joint];
+    for (uint8_t joint = 0; joint < wire::JOINTS; ++joint)
+        ledger.position_usteps[joint] = position.usteps[joint];
     return ledger;
 }
 

@@ -1,7 +1,7 @@
 // The motion in progress: the queue of segments, and the path clock that works it off.
 //
-// A segment is staged when received, committed with its whole frame, prepared (its runs handed to the step engine) shortly
-// before it starts, and executed when the clock passes its end.
+// A segment is staged when received, committed with its whole frame, prepared (its runs handed to the step
+// engine) shortly before it starts, and executed when the clock passes its end.
 #pragma once
 
 #include <stdint.h>

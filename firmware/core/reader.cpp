@@ -19,7 +19,9 @@ uint32_t Reader::varuint() {
     uint32_t value = 0;
     for (uint8_t shift = 0; shift < 35; shift = static_cast<uint8_t>(shift + 7)) {
         const uint8_t byte = u8();
-        if (shift == 28 && byte > 0x0F) break;  // a fifth byte holds the four highest bits and ends the number
+        if (shift == 28 && byte > 0x0F)
+            break;                           // a fifth byte holds the four highest bits and ends the number
+        if (shift != 0 && byte == 0) break;  // not the shortest form
         value |= static_cast<uint32_t>(byte & 0x7F) << shift;
         if (byte < 0x80) return ok_ ? value : 0;
     }

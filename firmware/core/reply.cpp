@@ -1,8 +1,8 @@
 #include "reply.h"
 
 #include "crc.h"
-#include "hal_serial.h"
 #include "framing.h"
+#include "hal_serial.h"
 #include "motion.h"
 #include "supervisor.h"
 #include "version.h"
@@ -17,7 +17,8 @@ uint32_t boot_nonce;
 // Encodes one frame: little-endian fields, stuffing, both checksums.
 class FrameWriter {
   public:
-    FrameWriter(uint8_t* encoded, uint8_t seq, wire::MessageType type, uint8_t length) : begin_(encoded), at_(encoded) {
+    FrameWriter(uint8_t* encoded, uint8_t seq, wire::MessageType type, uint8_t length)
+        : begin_(encoded), at_(encoded) {
         u8(length);
         u8(seq);
         u8(static_cast<uint8_t>(type));

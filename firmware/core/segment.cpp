@@ -25,11 +25,12 @@ bool interval_in_limits(uint32_t interval_q16) {
            interval_q16 <= static_cast<uint32_t>(wire::MAX_INTERVAL_TICKS) << 16;
 }
 
-// Intervals change by the same amount each time, so all are in their limits when the first and the last are, and the way
-// between these two did not wrap.
+// Intervals change by the same amount each time, so all are in their limits when the first and the last are,
+// and the way between these two did not wrap.
 bool intervals_in_limits(const Move& move) {
     if (move.steps < 2) return true;
-    const uint32_t size = move.add_q16 < 0 ? 0 - static_cast<uint32_t>(move.add_q16) : static_cast<uint32_t>(move.add_q16);
+    const uint32_t size =
+        move.add_q16 < 0 ? 0 - static_cast<uint32_t>(move.add_q16) : static_cast<uint32_t>(move.add_q16);
     const Product way = multiply(size, static_cast<uint16_t>(move.steps - 2));
     if (way.high > 0xFFFF) return false;
     const uint32_t last = last_interval_q16(move);
@@ -97,7 +98,8 @@ wire::Result check_segment(Segment& segment, Rest& rest) {
     const uint32_t duration_ticks = segment.duration_ticks;
     if (duration_ticks == 0 || duration_ticks > wire::MAX_SEGMENT_TICKS) return wire::Result::OUT_OF_RANGE;
     for (uint8_t joint = 0; joint < wire::JOINTS; ++joint) {
-        if (!check_move(segment.moves[joint], duration_ticks, rest.ticks[joint])) return wire::Result::OUT_OF_RANGE;
+        if (!check_move(segment.moves[joint], duration_ticks, rest.ticks[joint]))
+            return wire::Result::OUT_OF_RANGE;
     }
     return wire::Result::OK;
 }

@@ -8,7 +8,8 @@
 
 namespace planarm {
 
-// One joint's steps in a segment: step n rises first_ticks + floor((n I + n (n - 1) / 2 A) / 2^16) ticks after its start.
+// One joint's steps in a segment: step n rises first_ticks + floor((n I + n (n - 1) / 2 A) / 2^16) ticks
+// after its start.
 struct Move {
     uint32_t first_ticks;
     uint32_t interval_q16;
@@ -24,14 +25,15 @@ struct Segment {
     Move moves[wire::JOINTS];
 };
 
-// Time from each joint's last queued step to the end of the queue, saturated; a joint that has not moved yet counts as
-// resting for ever.
+// Time from each joint's last queued step to the end of the queue, saturated; a joint that has not moved yet
+// counts as resting for ever.
 struct Rest {
     static constexpr uint32_t FOREVER = 0xFFFFFFFF;
     uint32_t ticks[wire::JOINTS] = {FOREVER, FOREVER};
 };
 
-// Longest wait for which a compare register may be set ahead: the 16-bit timer must still tell early from late.
+// Longest wait for which a compare register may be set ahead: the 16-bit timer must still tell early from
+// late.
 constexpr uint16_t MAX_AHEAD_TICKS = wire::MAX_INTERVAL_TICKS;
 
 // Ticks from the first to the last step of a move whose intervals are in their limits. At most 2^31.

@@ -73,7 +73,8 @@ Result enable(Reader fields, uint32_t now_ticks) {
 Result start(Reader fields, uint32_t now_ticks) {
     const uint32_t lead_ticks = fields.u32();
     if (!fields.ok() || !fields.at_end()) return Result::MALFORMED;
-    if (lead_ticks < wire::MIN_LEAD_TICKS || lead_ticks > wire::MAX_SEGMENT_TICKS) return Result::OUT_OF_RANGE;
+    if (lead_ticks < wire::MIN_LEAD_TICKS || lead_ticks > wire::MAX_SEGMENT_TICKS)
+        return Result::OUT_OF_RANGE;
     if (!supervisor::allows(Command::START) || motion::is_empty()) return Result::WRONG_STATE;
     supervisor::apply(Command::START, now_ticks);
     motion::start(now_ticks + lead_ticks);
@@ -89,7 +90,8 @@ Result clear(Reader fields, uint32_t now_ticks) {
     return Result::OK;
 }
 
-// Stages the next segment of the frame, or commits all after the last. True when the frame is done, with its result.
+// Stages the next segment of the frame, or commits all after the last. True when the frame is done, with its
+// result.
 bool next_segment(Result& result, uint32_t now_ticks) {
     if (!supervisor::allows(Command::SEGMENTS)) {
         result = Result::WRONG_STATE;

@@ -16,8 +16,8 @@ constexpr int32_t START_AHEAD_TICKS = 0x8000;
 
 struct Ring {
     Run runs[RING_RUNS];
-    Run* oldest;  // not yet taken back
-    Run* free;    // the next to be filled
+    Run* oldest;              // not yet taken back
+    Run* free;                // the next to be filled
     int32_t position_usteps;  // of all runs taken back
 };
 
@@ -77,7 +77,8 @@ bool start_when_due(uint32_t now_ticks) {
     return away_ticks > 0 && start<JOINT>(*run);
 }
 
-// A pulse that rose without its interrupt having come: counts it and lets it fall. Interrupts are off, nothing is armed.
+// A pulse that rose without its interrupt having come: counts it and lets it fall. Interrupts are off,
+// nothing is armed.
 template <uint8_t JOINT>
 void finish_pulse() {
     if (!hal::step_is_high<JOINT>()) return;
@@ -152,7 +153,8 @@ void stop() {
         Ring& ring = rings[joint];
         const Run* const active = step_joints[joint].active;
         if (active != ring.free) {
-            ring.position_usteps += signed_steps(*active, static_cast<uint16_t>(active->steps - active->steps_left));
+            ring.position_usteps +=
+                signed_steps(*active, static_cast<uint16_t>(active->steps - active->steps_left));
         }
         clear(joint);
     }
@@ -171,7 +173,8 @@ Position position() {
         }
         if (now.active[joint] != ring.free) {
             const Run& run = *now.active[joint];
-            usteps += signed_steps(run, static_cast<uint16_t>(run.steps - now.left[joint] + (now.high[joint] ? 1 : 0)));
+            usteps += signed_steps(
+                run, static_cast<uint16_t>(run.steps - now.left[joint] + (now.high[joint] ? 1 : 0)));
         }
         total.usteps[joint] = usteps;
     }

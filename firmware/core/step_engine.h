@@ -1,9 +1,9 @@
-// Makes the step pulses. Each joint owns a compare channel and a small ring of runs; a rising edge is always made by the
-// compare match on its scheduled tick, the falling edge by the interrupt of that match.
+// Makes the step pulses. Each joint owns a compare channel and a small ring of runs; a rising edge is always
+// made by the compare match on its scheduled tick, the falling edge by the interrupt of that match.
 //
-// Two sides share a ring: the main program appends runs and takes executed ones back, the step interrupt works on `active`
-// and moves on along `next`. The interrupt alone goes on to a run marked `chained`; before any other it leaves the joint
-// idle, and the main program starts it again when it is due.
+// Two sides share a ring: the main program appends runs and takes executed ones back, the step interrupt
+// works on `active` and moves on along `next`. The interrupt alone goes on to a run marked `chained`; before
+// any other it leaves the joint idle, and the main program starts it again when it is due.
 #pragma once
 
 #include <stdint.h>
@@ -15,19 +15,19 @@ namespace planarm {
 
 // Steps of one joint in one direction, as the step interrupt works them off.
 struct Run {
-    uint32_t interval_q16;    // from the current step to the next
-    uint32_t add_q16;         // what the next interval has more, modulo 2^32
-    uint16_t fraction;        // of the current step's tick, in 2^-16
-    uint16_t steps_left;      // the current step included
-    uint32_t first_ticks;     // tick of the first step on the 32-bit clock
+    uint32_t interval_q16;  // from the current step to the next
+    uint32_t add_q16;       // what the next interval has more, modulo 2^32
+    uint16_t fraction;      // of the current step's tick, in 2^-16
+    uint16_t steps_left;    // the current step included
+    uint32_t first_ticks;   // tick of the first step on the 32-bit clock
     Run* next;
     uint16_t steps;
     bool positive;
-    volatile bool chained;    // written last: the interrupt may go on to this run by itself
+    volatile bool chained;  // written last: the interrupt may go on to this run by itself
 };
 
 struct StepJoint {
-    Run* volatile active;     // the run in progress, or the next one
+    Run* volatile active;  // the run in progress, or the next one
 };
 
 extern StepJoint step_joints[wire::JOINTS];
@@ -35,7 +35,8 @@ extern volatile bool step_missed;  // a step came too late to be placed; both jo
 
 namespace step_engine {
 
-// Distance that an edge must still have when it is placed: the low time, which also covers the way to the arming write.
+// Distance that an edge must still have when it is placed: the low time, which also covers the way to the
+// arming write.
 constexpr uint16_t STEP_MARGIN_TICKS = wire::MIN_STEP_LOW_TICKS;
 // The same after a DIR write.
 constexpr uint16_t DIR_MARGIN_TICKS = wire::MIN_DIR_SETUP_TICKS;
@@ -54,7 +55,8 @@ bool has_room(uint8_t joint);
 // Appends the run of `move` that starts at `start_ticks`; has_room must hold.
 void append(uint8_t joint, const Move& move, uint32_t start_ticks);
 
-// Starts idle joints whose next run is due soon and takes executed runs back. False when a step came too late.
+// Starts idle joints whose next run is due soon and takes executed runs back. False when a step came too
+// late.
 bool serve(uint32_t now_ticks);
 
 // True from a missed step to the stop that follows.

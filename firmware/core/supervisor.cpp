@@ -19,11 +19,11 @@ struct Transition {
 
 // A command in a state that is not listed is refused.
 constexpr Transition TRANSITIONS[] = {
-    {Command::ENABLE, State::IDLE, State::READY},      {Command::ENABLE, State::READY, State::READY},
-    {Command::RELEASE, State::READY, State::IDLE},     {Command::RELEASE, State::IDLE, State::IDLE},
-    {Command::SEGMENTS, State::READY, State::READY},   {Command::SEGMENTS, State::RUNNING, State::RUNNING},
-    {Command::START, State::READY, State::RUNNING},    {Command::CLEAR, State::IDLE, State::IDLE},
-    {Command::CLEAR, State::READY, State::IDLE},       {Command::CLEAR, State::FAULT, State::IDLE},
+    {Command::ENABLE, State::IDLE, State::READY},    {Command::ENABLE, State::READY, State::READY},
+    {Command::RELEASE, State::READY, State::IDLE},   {Command::RELEASE, State::IDLE, State::IDLE},
+    {Command::SEGMENTS, State::READY, State::READY}, {Command::SEGMENTS, State::RUNNING, State::RUNNING},
+    {Command::START, State::READY, State::RUNNING},  {Command::CLEAR, State::IDLE, State::IDLE},
+    {Command::CLEAR, State::READY, State::IDLE},     {Command::CLEAR, State::FAULT, State::IDLE},
 };
 
 State current_state;

@@ -1,5 +1,5 @@
-// States, the commands that each allows, and the first fault. What a change of state does to drivers and motion is in
-// supervisor.cpp; nothing else switches the drivers.
+// States, the commands that each allows, and the first fault. What a change of state does to drivers and
+// motion is in supervisor.cpp; nothing else switches the drivers.
 #pragma once
 
 #include <stdint.h>

@@ -35,7 +35,8 @@ uint32_t count_boot() {
     uint32_t count = 0;
     for (uint16_t i = 4; i-- > 0;) count = (count << 8) | read_byte(COUNT_ADDRESS + i);
     ++count;
-    // The highest byte first: a count cut short by a reset is then larger than the last one, never one used before.
+    // The highest byte first: a count cut short by a reset is then larger than the last one, never one used
+    // before.
     for (uint16_t i = 4; i-- > 0;) {
         const uint8_t byte = static_cast<uint8_t>(count >> (8 * i));
         if (byte != read_byte(COUNT_ADDRESS + i)) write_byte(COUNT_ADDRESS + i, byte);

@@ -1,8 +1,9 @@
-// Timer1 of the ATmega328P, free-running at the CPU clock, and the pins that it steps: joint 0 on OC1A (D9), joint 1 on
-// OC1B (D10). ATmega328P datasheet, section 15.
+// Timer1 of the ATmega328P, free-running at the CPU clock, and the pins that it steps: joint 0 on OC1A (D9),
+// joint 1 on OC1B (D10). ATmega328P datasheet, section 15.
 //
-// A channel's compare output is in one of two modes. Armed: the pin rises at the match. Disarmed: the pin falls at the
-// match, so a match means nothing to a low pin. Falling is a forced compare in the disarmed mode.
+// A channel's compare output is in one of two modes. Armed: the pin rises at the match. Disarmed: the pin
+// falls at the match, so a match means nothing to a low pin. Falling is a forced compare in the disarmed
+// mode.
 #pragma once
 
 #include <avr/interrupt.h>

@@ -9,8 +9,8 @@
 #include "hal_step_timer.h"
 #include "step_engine.h"
 
-// Runs before main and before memory is set up: drivers released (ENABLE high before it becomes an output), STEP and DIR
-// low, no watchdog left over from before the reset (ATmega328P datasheet, 10.9.2).
+// Runs before main and before memory is set up: drivers released (ENABLE high before it becomes an output),
+// STEP and DIR low, no watchdog left over from before the reset (ATmega328P datasheet, 10.9.2).
 extern "C" void early_pins() __attribute__((naked, used, section(".init3")));
 void early_pins() {
     PORTB = _BV(PORTB0);
@@ -27,8 +27,9 @@ ISR(TIMER1_COMPA_vect) { planarm::step_engine::on_match<0>(); }
 ISR(TIMER1_COMPB_vect) { planarm::step_engine::on_match<1>(); }
 
 int main() {
+    const uint32_t boot_count = hal::count_boot();
     hal::step_timer_init();
-    planarm::firmware::set_up(hal::count_boot());
+    planarm::firmware::set_up(boot_count, 0);
     hal::serial_init();
     sei();
     for (;;) planarm::firmware::pass();

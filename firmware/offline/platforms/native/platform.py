@@ -6,7 +6,6 @@ from platformio.platform.base import PlatformBase
 class NativePlatform(PlatformBase):
     """Programs for this computer."""
 
-    @property
-    def is_embedded(self):
+    def is_embedded(self) -> bool:
         """Tell PlatformIO to run the tests here instead of uploading them."""
-        return lambda: False
+        return False

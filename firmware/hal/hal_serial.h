@@ -1,4 +1,4 @@
-// USART0 at the wire's baud rate, 8N1: a receive ring and one reply at a time.
+// The serial line at the wire's baud rate, 8N1: a receive ring, and one reply at a time.
 #pragma once
 
 #include <stdint.h>

@@ -1,0 +1,215 @@
+#include "board.h"
+
+#include <deque>
+
+#include "firmware.h"
+#include "hal_pins.h"
+#include "hal_serial.h"
+#include "hal_step_timer.h"
+#include "messages.h"
+#include "step_engine.h"
+
+namespace hal {
+namespace board {
+
+namespace {
+
+namespace wire = planarm::wire;
+
+constexpr uint32_t TICKS_A_BYTE = 10 * (wire::TICKS_HZ / wire::BAUD);
+constexpr uint32_t READ_TICKS = 4;  // a reading of the timer
+
+struct Channel {
+    uint16_t edge;
+    bool armed;
+    bool high;
+    bool matched;  // the flag that asks for the interrupt
+    bool interrupt_on;
+};
+
+struct Board {
+    uint64_t now;
+    planarm_delays delays;
+    uint32_t interrupts;
+    unsigned locks;
+    Channel channels[wire::JOINTS];
+    bool dirs[wire::JOINTS];
+    bool enable_high;
+    std::deque<planarm_edge> edges;
+    std::deque<uint8_t> received;
+    std::deque<uint8_t> sent;
+    uint64_t sending_until;
+    uint8_t ring_full;
+};
+
+Board uno;
+
+void set_pin(bool& pin, bool level, uint8_t number) {
+    if (pin == level) return;
+    pin = level;
+    uno.edges.push_back({uno.now, number, static_cast<uint8_t>(level)});
+}
+
+uint64_t next_match(const Channel& channel) {
+    return uno.now + static_cast<uint16_t>(channel.edge - static_cast<uint16_t>(uno.now) - 1) + 1;
+}
+
+void match(uint8_t joint) {
+    Channel& channel = uno.channels[joint];
+    channel.matched = true;
+    set_pin(channel.high, channel.armed, wire::STEP_PINS[joint]);
+}
+
+template <uint8_t JOINT>
+bool interrupt() {
+    Channel& channel = uno.channels[JOINT];
+    if (!channel.matched || !channel.interrupt_on) return false;
+    channel.matched = false;
+    uno.locks = 1;
+    const planarm_delays& delays = uno.delays;
+    ++uno.interrupts;
+    const bool late = delays.late_every != 0 && uno.interrupts % delays.late_every == 0;
+    elapse(late ? delays.late_entry : delays.entry);
+    planarm::step_engine::on_match<JOINT>();
+    elapse(delays.leave);
+    uno.locks = 0;
+    return true;
+}
+
+void serve_interrupts() {
+    while (interrupt<0>() || interrupt<1>()) {
+    }
+}
+
+// Ticks up to and with the next match that asks for an interrupt, at most `most`.
+uint64_t ticks_to_interrupt(uint64_t most) {
+    for (const Channel& channel : uno.channels) {
+        const uint64_t away = next_match(channel) - uno.now;
+        if (channel.interrupt_on && away < most) most = away;
+    }
+    return most;
+}
+
+}  // namespace
+
+void elapse(uint32_t ticks) {
+    const uint64_t end = uno.now + ticks;
+    for (;;) {
+        uint64_t next = end;
+        for (const Channel& channel : uno.channels) {
+            if (next_match(channel) < next) next = next_match(channel);
+        }
+        if (uno.now == end) return;
+        uno.now = next;
+        for (uint8_t joint = 0; joint < wire::JOINTS; ++joint) {
+            if (uno.channels[joint].edge == static_cast<uint16_t>(next)) match(joint);
+        }
+    }
+}
+
+void lock() { ++uno.locks; }
+
+void unlock() {
+    if (--uno.locks == 0) serve_interrupts();
+}
+
+uint16_t counter() {
+    elapse(READ_TICKS);
+    return static_cast<uint16_t>(uno.now);
+}
+
+uint16_t edge(uint8_t joint) { return uno.channels[joint].edge; }
+
+void set_edge(uint8_t joint, uint16_t tick) { uno.channels[joint].edge = tick; }
+
+void arm(uint8_t joint, bool armed) { uno.channels[joint].armed = armed; }
+
+void fall(uint8_t joint) { set_pin(uno.channels[joint].high, false, wire::STEP_PINS[joint]); }
+
+bool is_high(uint8_t joint) { return uno.channels[joint].high; }
+
+void forget_match(uint8_t joint) { uno.channels[joint].matched = false; }
+
+void enable_interrupt(uint8_t joint, bool on) { uno.channels[joint].interrupt_on = on; }
+
+bool interrupt_is_on(uint8_t joint) { return uno.channels[joint].interrupt_on; }
+
+void write_dir(uint8_t joint, bool positive) { set_pin(uno.dirs[joint], positive, wire::DIR_PINS[joint]); }
+
+}  // namespace board
+
+using board::uno;
+
+void drivers_enable(bool on) { board::set_pin(uno.enable_high, !on, planarm::wire::ENABLE_PIN); }
+
+bool serial_read(uint8_t& byte) {
+    if (uno.received.empty()) return false;
+    byte = uno.received.front();
+    uno.received.pop_front();
+    return true;
+}
+
+bool serial_can_send() { return uno.now >= uno.sending_until; }
+
+void serial_send(const uint8_t* bytes, uint8_t size) {
+    uno.sent.insert(uno.sent.end(), bytes, bytes + size);
+    uno.sending_until = uno.now + static_cast<uint64_t>(size) * board::TICKS_A_BYTE;
+}
+
+uint8_t serial_overruns() { return 0; }
+
+uint8_t serial_ring_full() { return uno.ring_full; }
+
+}  // namespace hal
+
+namespace {
+
+template <typename Item>
+size_t take(std::deque<Item>& from, Item* to, size_t most) {
+    size_t count = 0;
+    for (; count < most && !from.empty(); ++count) {
+        to[count] = from.front();
+        from.pop_front();
+    }
+    return count;
+}
+
+}  // namespace
+
+using hal::board::uno;
+
+void planarm_power_on(uint32_t boot_count, uint64_t tick, planarm_delays delays) {
+    uno = hal::board::Board();
+    uno.now = tick;
+    uno.delays = delays;
+    uno.enable_high = true;
+    planarm::firmware::set_up(boot_count, static_cast<uint32_t>(tick));
+}
+
+void planarm_receive(const uint8_t* bytes, size_t count) {
+    for (size_t i = 0; i < count; ++i) {
+        if (uno.received.size() == planarm::wire::RX_RING_BYTES) {
+            ++uno.ring_full;
+        } else {
+            uno.received.push_back(bytes[i]);
+        }
+    }
+}
+
+void planarm_run(uint64_t ticks) {
+    const uint64_t end = uno.now + ticks;
+    while (uno.now < end) {
+        planarm::firmware::pass();
+        const uint64_t rest_until = uno.now + uno.delays.pass;
+        while (uno.now < rest_until) {
+            hal::board::elapse(static_cast<uint32_t>(hal::board::ticks_to_interrupt(rest_until - uno.now)));
+            hal::board::serve_interrupts();
+        }
+    }
+}
+
+uint64_t planarm_now() { return uno.now; }
+
+size_t planarm_take_sent(uint8_t* bytes, size_t most) { return take(uno.sent, bytes, most); }
+
+size_t planarm_take_edges(planarm_edge* edges, size_t most) { return take(uno.edges, edges, most); }

@@ -1,0 +1,101 @@
+// Timer1 with its two step outputs and the DIR pins, simulated: what hal/uno/hal_step_timer.h does on the
+// chip.
+#pragma once
+
+#include <stdint.h>
+
+#define HAL_INLINE inline
+
+namespace hal {
+
+// The simulated hardware, in board.cpp. Joints are 0 and 1.
+namespace board {
+void lock();
+void unlock();
+uint16_t counter();
+uint16_t edge(uint8_t joint);
+void set_edge(uint8_t joint, uint16_t tick);
+void arm(uint8_t joint, bool armed);
+void fall(uint8_t joint);
+bool is_high(uint8_t joint);
+void forget_match(uint8_t joint);
+void enable_interrupt(uint8_t joint, bool on);
+bool interrupt_is_on(uint8_t joint);
+void write_dir(uint8_t joint, bool positive);
+void elapse(uint32_t ticks);
+}  // namespace board
+
+class InterruptLock {
+  public:
+    InterruptLock() { board::lock(); }
+    ~InterruptLock() { board::unlock(); }
+    InterruptLock(const InterruptLock&) = delete;
+    InterruptLock& operator=(const InterruptLock&) = delete;
+};
+
+// An interrupt may come here, as on the chip: between any two statements that the barrier keeps in order.
+inline void compiler_barrier() { InterruptLock(); }
+
+inline uint16_t counter() { return board::counter(); }
+
+template <uint8_t JOINT>
+uint16_t step_edge() {
+    return board::edge(JOINT);
+}
+
+template <uint8_t JOINT>
+void step_set_edge(uint16_t tick) {
+    board::set_edge(JOINT, tick);
+}
+
+template <uint8_t JOINT>
+void step_arm() {
+    board::arm(JOINT, true);
+}
+
+template <uint8_t JOINT>
+void step_fall() {
+    board::arm(JOINT, false);
+    board::fall(JOINT);
+}
+
+template <uint8_t JOINT>
+bool step_is_high() {
+    return board::is_high(JOINT);
+}
+
+template <uint8_t JOINT>
+void step_forget_match() {
+    board::forget_match(JOINT);
+}
+
+template <uint8_t JOINT>
+void step_interrupt_on() {
+    board::enable_interrupt(JOINT, true);
+}
+
+template <uint8_t JOINT>
+void step_interrupt_off() {
+    board::enable_interrupt(JOINT, false);
+}
+
+template <uint8_t JOINT>
+bool step_interrupt_is_on() {
+    return board::interrupt_is_on(JOINT);
+}
+
+inline void steps_off() {
+    for (uint8_t joint = 0; joint < 2; ++joint) {
+        board::arm(joint, false);
+        board::enable_interrupt(joint, false);
+    }
+}
+
+inline void wait_step_high() { board::elapse(33); }
+
+template <uint8_t JOINT>
+void dir_write(bool positive) {
+    board::write_dir(JOINT, positive);
+}
+
+}  // namespace hal

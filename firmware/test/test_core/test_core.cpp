@@ -1,0 +1,221 @@
+// Tests of the core in C++, with every access checked: built with the address and undefined-behaviour
+// sanitizers.
+
+#include <stdint.h>
+#include <string.h>
+
+#include <random>
+#include <vector>
+
+#include "board.h"
+#include "check.h"
+#include "crc.h"
+#include "frame_receiver.h"
+#include "framing.h"
+#include "reader.h"
+#include "segment.h"
+
+namespace {
+
+using planarm::FrameReceiver;
+using planarm::Move;
+using planarm::Reader;
+namespace wire = planarm::wire;
+
+using Bytes = std::vector<uint8_t>;
+
+std::mt19937 random_bits(1);  // the same sequence at every run
+
+uint32_t random_below(uint32_t end) { return static_cast<uint32_t>(random_bits() % end); }
+
+uint16_t crc_of(const Bytes& bytes, uint16_t initial) {
+    uint16_t crc = initial;
+    for (uint8_t byte : bytes) crc = planarm::crc_update(crc, byte);
+    return crc;
+}
+
+// The checksum bit by bit, as its definition says.
+uint16_t plain_crc(const Bytes& bytes, uint16_t crc) {
+    for (uint8_t byte : bytes) {
+        crc = static_cast<uint16_t>(crc ^ byte);
+        for (int bit = 0; bit < 8; ++bit)
+            crc = static_cast<uint16_t>((crc >> 1) ^ ((crc & 1) != 0 ? 0x8408 : 0));
+    }
+    return crc;
+}
+
+void append_crc(Bytes& bytes, uint16_t crc) {
+    bytes.push_back(static_cast<uint8_t>(crc));
+    bytes.push_back(static_cast<uint8_t>(crc >> 8));
+}
+
+Bytes encode(uint8_t seq, uint8_t type, const Bytes& payload) {
+    Bytes body = {static_cast<uint8_t>(payload.size()), seq, type};
+    const uint16_t header_crc = crc_of(body, wire::CRC_INITIAL);
+    append_crc(body, header_crc);
+    body.insert(body.end(), payload.begin(), payload.end());
+    if (!payload.empty()) append_crc(body, crc_of(payload, header_crc));
+    Bytes line;
+    for (uint8_t byte : body) {
+        if (planarm::is_special(byte)) {
+            line.push_back(wire::ESCAPE);
+            byte ^= wire::ESCAPE_XOR;
+        }
+        line.push_back(byte);
+    }
+    line.push_back(wire::DELIMITER);
+    return line;
+}
+
+Bytes random_bytes(size_t most) {
+    Bytes bytes(random_below(static_cast<uint32_t>(most + 1)));
+    for (uint8_t& byte : bytes) byte = static_cast<uint8_t>(random_bits());
+    return bytes;
+}
+
+FrameReceiver::Event last_event(FrameReceiver& receiver, const Bytes& line) {
+    FrameReceiver::Event event = FrameReceiver::Event::NONE;
+    for (uint8_t byte : line) event = receiver.receive(byte);
+    return event;
+}
+
+constexpr planarm_delays DELAYS = {600, 60, 0, 0, 120};
+
+void power_on() { planarm_power_on(7, 0, DELAYS); }
+
+void send(const Bytes& line) {
+    planarm_receive(line.data(), line.size());
+    planarm_run(40000);
+}
+
+bool anything_stepped() {
+    planarm_edge edge;
+    bool stepped = false;
+    while (planarm_take_edges(&edge, 1) != 0) stepped = stepped || edge.pin != wire::ENABLE_PIN;
+    return stepped;
+}
+
+}  // namespace
+
+CASE(crc_has_the_check_value) {
+    const char* digits = "123456789";
+    CHECK(crc_of(Bytes(digits, digits + 9), wire::CRC_INITIAL) == 0x6F91);
+}
+
+CASE(crc_equals_its_definition) {
+    for (int i = 0; i < 200; ++i) {
+        const Bytes bytes = random_bytes(60);
+        const uint16_t initial = static_cast<uint16_t>(random_bits());
+        CHECK(crc_of(bytes, initial) == plain_crc(bytes, initial));
+    }
+}
+
+CASE(reader_takes_numbers_in_their_shortest_form_only) {
+    const struct {
+        Bytes bytes;
+        bool good;
+        uint32_t value;
+    } cases[] = {
+        {{0x00}, true, 0},
+        {{0x7F}, true, 127},
+        {{0x80, 0x01}, true, 128},
+        {{0xFF, 0xFF, 0xFF, 0xFF, 0x0F}, true, 0xFFFFFFFF},
+        {{0xFF, 0xFF, 0xFF, 0xFF, 0x1F}, false, 0},
+        {{0xFF, 0xFF, 0xFF, 0xFF, 0x8F, 0x00}, false, 0},
+        {{0x80, 0x00}, false, 0},
+        {{0x80}, false, 0},
+        {{}, false, 0},
+    };
+    for (const auto& item : cases) {
+        Reader reader(item.bytes.data(), static_cast<uint8_t>(item.bytes.size()));
+        CHECK(reader.varuint() == item.value);
+        CHECK(reader.ok() == item.good);
+    }
+}
+
+CASE(reader_undoes_zigzag) {
+    const Bytes bytes = {0x00, 0x01, 0x02, 0xFE, 0xFF, 0xFF, 0xFF, 0x0F, 0xFF, 0xFF, 0xFF, 0xFF, 0x0F};
+    Reader reader(bytes.data(), static_cast<uint8_t>(bytes.size()));
+    const int32_t expected[] = {0, -1, 1, INT32_MAX, INT32_MIN};
+    for (int32_t value : expected) CHECK(reader.varint() == value);
+    CHECK(reader.ok() && reader.at_end());
+}
+
+CASE(receiver_takes_every_frame_that_is_sound) {
+    FrameReceiver receiver;
+    for (int i = 0; i < 500; ++i) {
+        const Bytes payload = random_bytes(wire::MAX_PAYLOAD_BYTES);
+        const uint8_t seq = static_cast<uint8_t>(random_bits());
+        const uint8_t type = static_cast<uint8_t>(random_bits());
+        CHECK(last_event(receiver, encode(seq, type, payload)) == FrameReceiver::Event::FRAME);
+        const planarm::Frame frame = receiver.frame();
+        CHECK(frame.seq == seq && frame.type == type && frame.length == payload.size());
+        CHECK(payload.empty() || memcmp(frame.payload, payload.data(), payload.size()) == 0);
+    }
+}
+
+CASE(receiver_finds_every_single_damaged_bit) {
+    FrameReceiver receiver;
+    const Bytes line = encode(5, 4, {1, 2, 0x7E, 4, 0x7D, 6});
+    for (size_t bit = 0; bit < 8 * (line.size() - 1); ++bit) {
+        Bytes damaged = line;
+        damaged[bit / 8] = static_cast<uint8_t>(damaged[bit / 8] ^ (1u << bit % 8));
+        bool good = false;
+        for (uint8_t byte : damaged) good = good || receiver.receive(byte) == FrameReceiver::Event::FRAME;
+        CHECK(!good);
+        CHECK(last_event(receiver, line) == FrameReceiver::Event::FRAME);
+    }
+}
+
+CASE(last_tick_of_a_move_is_the_closed_form) {
+    for (int i = 0; i < 20000; ++i) {
+        Move move = {};
+        move.steps = static_cast<uint16_t>(1 + random_below(wire::MAX_SEGMENT_STEPS));
+        const int64_t least = static_cast<int64_t>(wire::MIN_INTERVAL_TICKS) << 16;
+        const int64_t most = static_cast<int64_t>(wire::MAX_INTERVAL_TICKS) << 16;
+        move.interval_q16 = static_cast<uint32_t>(
+            least + static_cast<int64_t>(random_bits() % static_cast<uint64_t>(most - least)));
+        const int64_t changes = move.steps > 2 ? move.steps - 2 : 1;
+        const int64_t last =
+            least + static_cast<int64_t>(random_bits() % static_cast<uint64_t>(most - least));
+        const int64_t add = (last - move.interval_q16) / changes;
+        if (add < INT32_MIN || add > INT32_MAX) continue;
+        move.add_q16 = static_cast<int32_t>(add);
+        const int64_t n = move.steps - 1;
+        const int64_t closed_form = n == 0 ? 0 : (n * move.interval_q16 + n * (n - 1) / 2 * add) >> 16;
+        CHECK(planarm::run_ticks(move) == closed_form);
+    }
+}
+
+CASE(sound_frames_of_any_content_do_no_harm) {
+    power_on();
+    send(encode(0, 1, {wire::PROTOCOL_VERSION, 1, 2, 3, 4}));
+    for (int i = 0; i < 3000; ++i) {
+        // The firmware may or may not expect this number; about half of the frames are carried out.
+        static uint8_t seq = 1;
+        Bytes payload = random_bytes(wire::MAX_PAYLOAD_BYTES);
+        if (random_below(2) == 0) {
+            for (uint8_t& byte : payload) byte &= 0x0F;
+        }
+        const uint8_t type = static_cast<uint8_t>(random_below(10));
+        send(encode(seq++, type, payload));
+        if (random_below(100) == 0) {
+            send(encode(200, 1, {wire::PROTOCOL_VERSION, 1, 2, 3, 4}));
+            seq = 201;
+            send(encode(seq++, 6, {}));
+            send(encode(seq++, 3, {1}));
+        }
+    }
+    uint8_t sent[256];
+    CHECK(planarm_take_sent(sent, sizeof sent) > 0);
+}
+
+CASE(random_bytes_never_step) {
+    power_on();
+    send(encode(0, 1, {wire::PROTOCOL_VERSION, 1, 2, 3, 4}));
+    send(encode(1, 3, {1}));
+    for (int i = 0; i < 3000; ++i) send(random_bytes(120));
+    CHECK(!anything_stepped());
+}
+
+int main() { return run_all(); }

@@ -1,0 +1,92 @@
+"""The released flash image is what the sources give, by avr-gcc and by PlatformIO, anywhere and at any time."""
+
+from __future__ import annotations
+
+import hashlib
+import importlib.util
+import json
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from planarm_wire.messages import SPEC_HASH
+
+FIRMWARE = Path(__file__).parents[2] / "firmware"
+IMAGE = FIRMWARE / "release" / "uno.hex"
+TOLD = json.loads((FIRMWARE / "release" / "uno.json").read_text(encoding="utf-8"))
+
+needs_avr_gcc = pytest.mark.skipif(
+    shutil.which("avr-gcc") is None, reason="avr-gcc is not installed (Debian: gcc-avr, avr-libc): no image is built"
+)
+needs_released_compiler = pytest.mark.skipif(
+    shutil.which("avr-gcc") is not None
+    and TOLD["compiler"]
+    not in subprocess.run(["avr-gcc", "--version"], capture_output=True, text=True, check=True).stdout,
+    reason=f"the image was released with {TOLD['compiler']}; another compiler gives other bytes",
+)
+needs_pio = pytest.mark.skipif(
+    importlib.util.find_spec("platformio") is None or importlib.util.find_spec("SCons") is None,
+    reason="platformio and scons are not installed: PlatformIO's build is not tried",
+)
+needs_gxx = pytest.mark.skipif(shutil.which("g++") is None, reason="g++ is not installed: no core for this computer")
+
+
+def build(command: str, out: Path, firmware: Path = FIRMWARE) -> str:
+    done = subprocess.run(
+        [sys.executable, str(firmware / "build.py"), command, "--out", str(out)],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+def bytes_of(hex_file: Path) -> bytes:
+    """The image of an Intel hex file without gaps, every record's sum checked."""
+    image = bytearray()
+    for line in hex_file.read_text(encoding="ascii").splitlines():
+        record = bytes.fromhex(line.removeprefix(":"))
+        assert sum(record) % 256 == 0
+        if record[3] == 0:
+            assert int.from_bytes(record[1:3], "big") == len(image)
+            image += record[4 : 4 + record[0]]
+    return bytes(image)
+
+
+def test_description_is_true() -> None:
+    assert hashlib.sha256(IMAGE.read_bytes()).hexdigest() == TOLD["sha256"]
+    image = bytes_of(IMAGE)
+    assert len(image) == TOLD["flash_bytes"]
+    assert int(TOLD["spec_hash"], 16) == SPEC_HASH
+
+
+def test_image_leaves_room() -> None:
+    assert TOLD["flash_bytes"] <= 32_768 - 512  # the Uno's boot loader takes 512 bytes
+    assert TOLD["sram_bytes"] <= 2048 - 256  # for the stack
+
+
+@needs_avr_gcc
+@needs_released_compiler
+@needs_pio
+def test_both_builds_give_the_released_image(tmp_path: Path) -> None:
+    build("check", tmp_path)
+
+
+@needs_avr_gcc
+def test_the_place_of_the_build_does_not_matter(tmp_path: Path) -> None:
+    copy = tmp_path / "elsewhere" / "firmware"
+    shutil.copytree(FIRMWARE, copy, ignore=shutil.ignore_patterns("build", ".pio", "__pycache__"))
+    build("avr", tmp_path / "a")
+    build("avr", tmp_path / "b", copy)
+    assert (tmp_path / "a" / "uno.hex").read_bytes() == (tmp_path / "b" / "uno.hex").read_bytes()
+
+
+@needs_gxx
+@needs_pio
+def test_the_cores_own_tests(tmp_path: Path) -> None:
+    said = build("test", tmp_path)
+    assert "FAIL" not in said
+    assert said.count("PASS ") >= 9

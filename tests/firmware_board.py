@@ -1,0 +1,254 @@
+"""The firmware's core on a simulated board, driven from Python, and what a motion's edges should be."""
+
+from __future__ import annotations
+
+import ctypes
+import itertools
+from collections import deque
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from planarm_wire.codec import decode, encode
+from planarm_wire.framing import Frame, FrameDecoder, encode_frame
+from planarm_wire.messages import (
+    DIR_PINS,
+    ENABLE_PIN,
+    JOINTS,
+    PROTOCOL_VERSION,
+    QUEUE_SLOTS,
+    STEP_PINS,
+    Clear,
+    Enable,
+    Hello,
+    Message,
+    Move,
+    Query,
+    Segment,
+    Segments,
+    Start,
+    Status,
+    Welcome,
+)
+from planarm_wire.steps import direction, duration_ticks, expand_moves
+
+LEAD_TICKS = 20_000
+REST = Move(0, 0, 0, 0)
+
+
+@dataclass(frozen=True)
+class Delays:
+    """How long things take on the simulated board, in ticks. The defaults are near the Uno's."""
+
+    pass_ticks: int = 600
+    entry_ticks: int = 60
+    late_entry_ticks: int = 0
+    late_every: int = 0
+    leave_ticks: int = 120
+
+
+@dataclass(frozen=True)
+class Edge:
+    tick: int
+    pin: str
+    level: int
+
+
+class _Edge(ctypes.Structure):
+    _fields_ = (("tick", ctypes.c_uint64), ("pin", ctypes.c_uint8), ("level", ctypes.c_uint8))
+
+
+class _Delays(ctypes.Structure):
+    _fields_ = tuple((name, ctypes.c_uint32) for name in ("pass", "entry", "late_entry", "late_every", "leave"))
+
+
+class NativeFirmware:
+    """The shared library that `firmware/build.py native` makes. It holds one board."""
+
+    def __init__(self, library: Path) -> None:
+        self._library = ctypes.CDLL(str(library))
+        self._library.planarm_power_on.argtypes = (ctypes.c_uint32, ctypes.c_uint64, _Delays)
+        self._library.planarm_receive.argtypes = (ctypes.c_char_p, ctypes.c_size_t)
+        self._library.planarm_run.argtypes = (ctypes.c_uint64,)
+        self._library.planarm_now.restype = ctypes.c_uint64
+        self._library.planarm_take_sent.restype = ctypes.c_size_t
+        self._library.planarm_take_edges.restype = ctypes.c_size_t
+
+    def power_on(self, boot_count: int, tick: int, delays: Delays) -> None:
+        fields = (delays.pass_ticks, delays.entry_ticks, delays.late_entry_ticks, delays.late_every, delays.leave_ticks)
+        self._library.planarm_power_on(boot_count, tick, _Delays(*fields))
+
+    def receive(self, data: bytes) -> None:
+        self._library.planarm_receive(data, len(data))
+
+    def run(self, ticks: int) -> None:
+        self._library.planarm_run(ticks)
+
+    def now(self) -> int:
+        return int(self._library.planarm_now())
+
+    def take_sent(self) -> bytes:
+        buffer = ctypes.create_string_buffer(65_536)
+        count = self._library.planarm_take_sent(buffer, len(buffer))
+        return buffer.raw[:count]
+
+    def take_edges(self) -> list[Edge]:
+        edges: list[Edge] = []
+        buffer = (_Edge * 4096)()
+        while count := self._library.planarm_take_edges(buffer, len(buffer)):
+            edges += [Edge(edge.tick, f"D{edge.pin}", edge.level) for edge in buffer[:count]]
+        return edges
+
+
+class Board:
+    """A board just powered on, with a host's end of the line: sequence numbers, and replies as messages."""
+
+    def __init__(
+        self, firmware: NativeFirmware, *, delays: Delays = Delays(), tick: int = 0, boot_count: int = 1
+    ) -> None:
+        self._firmware = firmware
+        self._decoder = FrameDecoder()
+        self.seq = 0
+        self.edges: list[Edge] = []
+        self.replies: deque[tuple[int, Message]] = deque()
+        firmware.power_on(boot_count, tick, delays)
+
+    @property
+    def now(self) -> int:
+        return self._firmware.now()
+
+    def receive(self, data: bytes) -> None:
+        self._firmware.receive(data)
+
+    def run(self, ticks: int) -> None:
+        """Let time pass and collect edges and replies; every reply must be a good frame."""
+        self._firmware.run(ticks)
+        self.edges += self._firmware.take_edges()
+        for item in self._decoder.feed(self._firmware.take_sent()):
+            assert isinstance(item, Frame), item
+            self.replies.append((item.seq, decode(item.type_code, item.payload)))
+
+    def send(self, message: Message, *, seq: int | None = None) -> None:
+        """Send one frame, with the next sequence number unless told otherwise."""
+        self.receive(encode_frame(self.seq if seq is None else seq, *encode(message)))
+        if seq is None:
+            self.seq = (self.seq + 1) % 256
+
+    def ask(self, message: Message | None = None, *, seq: int | None = None) -> Status:
+        """Send a frame (QUERY unless told otherwise) and return the STATUS that answers it."""
+        self.replies.clear()
+        self.send(Query() if message is None else message, seq=seq)
+        self.run(60_000)
+        last = self.replies[-1][1]
+        assert isinstance(last, Status), last
+        return last
+
+    def hello(self, *, version: int = PROTOCOL_VERSION, nonce: int = 0x01020304, seq: int = 0) -> Welcome:
+        """Open a session and return the WELCOME."""
+        self.replies.clear()
+        self.send(Hello(version, nonce), seq=seq)
+        self.seq = (seq + 1) % 256
+        self.run(60_000)
+        ((_, welcome),) = self.replies
+        assert isinstance(welcome, Welcome), welcome
+        return welcome
+
+    def get_ready(self) -> Status:
+        """HELLO and ENABLE."""
+        self.hello()
+        return self.ask(Enable(1))
+
+    def recover(self) -> Status:
+        """CLEAR and ENABLE."""
+        self.ask(Clear())
+        return self.ask(Enable(1))
+
+    def stream(self, segments: Sequence[Segment], *, lead_ticks: int = LEAD_TICKS, slice_ticks: int = 8000) -> Status:
+        """Play a whole motion, one segment a frame, keeping the queue full; return the first STATUS after its end."""
+        waiting = deque(segments)
+        started = False
+        free = QUEUE_SLOTS
+        while True:
+            while waiting and free:
+                self.send(Segments((waiting.popleft(),)))
+                free -= 1
+                self.run(8000)
+            if not started:
+                self.send(Start(lead_ticks))
+                started = True
+            self.run(slice_ticks)
+            status = self.ask_now()
+            if status.state.name != "RUNNING":
+                return status
+            free = status.free_slots
+
+    def ask_now(self) -> Status:
+        """QUERY and return its STATUS as soon as it is there."""
+        self.replies.clear()
+        self.send(Query())
+        while not any(seq == self.seq for seq, _ in self.replies):
+            self.run(2000)
+        status = self.replies[-1][1]
+        assert isinstance(status, Status), status
+        return status
+
+    def rises(self, joint: int) -> list[int]:
+        """The ticks of a joint's rising STEP edges so far."""
+        return [edge.tick for edge in self.edges if edge.pin == STEP_PINS[joint] and edge.level]
+
+    def position_at(self, joint: int, tick: int) -> int:
+        """Signed steps up to and with a tick, rebuilt from the pins."""
+        positive = False
+        position = 0
+        for edge in itertools.takewhile(lambda edge: edge.tick <= tick, self.edges):
+            if edge.pin == DIR_PINS[joint]:
+                positive = bool(edge.level)
+            elif edge.pin == STEP_PINS[joint] and edge.level:
+                position += 1 if positive else -1
+        return position
+
+    def motion_edges(self) -> list[Edge]:
+        """All edges but ENABLE's."""
+        return [edge for edge in self.edges if edge.pin != ENABLE_PIN]
+
+
+def run_of(
+    steps: int, *, first: int = 1000, interval: int = 1000, add: int = 0, positive: bool = True, fraction: int = 0
+) -> Move:
+    """A move with whole-tick interval and change, and a fraction of 2^-16 ticks more in the interval."""
+    if steps == 0:
+        return REST
+    if steps == 1:
+        return Move(2 + positive, first, 0, 0)
+    return Move(2 * steps + positive, first, (interval << 16) + fraction, add << 16)
+
+
+def segment_of(duration: int, *moves: Move, last: bool = False) -> Segment:
+    """A segment; joints without a move rest."""
+    return Segment(2 * duration + last, (*moves, *(REST,) * (JOINTS - len(moves))))
+
+
+def end_motion(segments: Iterable[Segment]) -> list[Segment]:
+    """The segments, the last of them marked as such."""
+    *head, tail = segments
+    return [*head, replace(tail, duration_flags=tail.duration_flags | 1)]
+
+
+@dataclass(frozen=True)
+class Schedule:
+    """The edges that a motion should make, relative to its first segment's start: for each joint (tick, +1 or -1)."""
+
+    steps: tuple[list[tuple[int, int]], ...]
+    ends: list[int]
+
+    @classmethod
+    def of(cls, segments: Sequence[Segment]) -> Schedule:
+        ends = list(itertools.accumulate(duration_ticks(segment) for segment in segments))
+        steps: tuple[list[tuple[int, int]], ...] = tuple([] for _ in range(JOINTS))
+        for segment, start in zip(segments, [0, *ends[:-1]], strict=True):
+            for joint, ticks in enumerate(expand_moves(segment)):
+                steps[joint].extend((start + tick, direction(segment.moves[joint])) for tick in ticks)
+        return cls(steps, ends)
+
+    def positions(self) -> tuple[int, ...]:
+        return tuple(sum(sign for _, sign in joint) for joint in self.steps)
