@@ -72,8 +72,8 @@ def test_cells_free_as_a_whole_hold_no_pose_that_is_not_free(elbow, limits):
     for dx, dy in [(-0.5, -0.5), (0.5, -0.5), (-0.5, 0.5), (0.5, 0.5), *rng.uniform(-0.5, 0.5, (20, 2))]:
         corner = tips + np.array([dx, dy])
         r = np.linalg.norm(corner, axis=1)
-        assert r.min() >= world.r_min_cm
-        assert r.max() <= world.r_max_cm
+        assert r.min() >= world.arm.r_min_cm
+        assert r.max() <= world.arm.r_max_cm
         theta2 = np.arccos((r**2 - l1**2 - l2**2) / (2 * l1 * l2)) * (-1 if elbow == "up" else 1)
         psi = np.arctan2(l2 * np.sin(theta2), l1 + l2 * np.cos(theta2))
         q = np.column_stack([np.arctan2(corner[:, 1], corner[:, 0]) - psi, theta2])

@@ -59,10 +59,10 @@ def spare_cm(scene, world, tips):
     """Clearance beyond the margin of the poses at the tips, -inf where the arm cannot or may not be there."""
     q = poses(scene, tips)
     r = np.linalg.norm(tips - np.asarray(scene.arm.base_cm), axis=1)
-    allowed = (r >= world.r_min_cm - 1e-9) & (r <= world.r_max_cm + 1e-9)
-    allowed &= (q[:, 0] >= world.theta1_min_rad) & (q[:, 0] <= world.theta1_max_rad)
+    allowed = (r >= world.arm.r_min_cm - 1e-9) & (r <= world.arm.r_max_cm + 1e-9)
+    allowed &= (q[:, 0] >= world.arm.theta1_min_rad) & (q[:, 0] <= world.arm.theta1_max_rad)
     spare = np.full(len(tips), -np.inf)
-    spare[allowed] = clearances_cm(world, q[allowed]) - world.margin_cm
+    spare[allowed] = clearances_cm(world, q[allowed]) - world.arm.margin_cm
     return spare
 
 
@@ -74,19 +74,19 @@ def test_the_motion_bound_is_never_exceeded(seed):
     for _ in range(500):
         scene = random_arm(rng)
         arm, world = arm_and_world(scene)
-        r = float(rng.uniform(world.r_min_cm, world.r_max_cm))
+        r = float(rng.uniform(world.arm.r_min_cm, world.arm.r_max_cm))
         rho = float(10.0 ** rng.uniform(-3, 1.3))
         direction = rng.uniform(0, 2 * pi)
         center = r * np.array([np.cos(direction), np.sin(direction)])
         around, out = rng.uniform(0, 2 * pi, 300), rho * np.sqrt(rng.uniform(0.9, 1.0, 300))
         tips = center + np.column_stack([out * np.cos(around), out * np.sin(around)])
         distances = np.linalg.norm(tips, axis=1)
-        tips = tips[(distances >= world.r_min_cm) & (distances <= world.r_max_cm)]
+        tips = tips[(distances >= world.arm.r_min_cm) & (distances <= world.arm.r_max_cm)]
         home = inverse_2r(arm, center, scene.arm.elbow)
         q = inverse_2r(arm, tips, scene.arm.elbow)
         turn = np.abs((q[:, 0] - home[0] + pi) % (2 * pi) - pi)
         moved = np.linalg.norm(forward(arm, q)[:, 1:] - forward(arm, home)[1:], axis=2)
-        dtheta1, displacement = motion_bound(world, r, rho)
+        dtheta1, displacement = motion_bound(world.arm, r, rho)
         assert np.all(turn <= dtheta1 + 1e-7)
         assert np.all(moved <= displacement + 1e-6)
         if len(moved):
@@ -101,20 +101,20 @@ def test_the_turn_of_joint_1_is_bounded_by_the_extremes_of_direction_and_of_beta
         scene = random_arm(rng)
         world = build_world(scene)
         l1, l2 = scene.arm.link_lengths_cm
-        r = float(rng.uniform(world.r_min_cm, world.r_max_cm))
+        r = float(rng.uniform(world.arm.r_min_cm, world.arm.r_max_cm))
         rho = float(rng.uniform(0.05, 0.9)) * r
-        distances = np.clip(np.linspace(r - rho, r + rho, 20001), world.r_min_cm, world.r_max_cm)
+        distances = np.clip(np.linspace(r - rho, r + rho, 20001), world.arm.r_min_cm, world.arm.r_max_cm)
         betas = np.arccos(np.clip((distances**2 + l1**2 - l2**2) / (2 * distances * l1), -1, 1))
         beta = np.arccos(np.clip((r**2 + l1**2 - l2**2) / (2 * r * l1), -1, 1))
         expected = min(pi, np.arcsin(rho / r) + np.abs(betas - beta).max())
-        assert motion_bound(world, r, rho)[0] == pytest.approx(expected, abs=2e-3)
-        assert motion_bound(world, r, rho)[0] >= expected - 1e-12
+        assert motion_bound(world.arm, r, rho)[0] == pytest.approx(expected, abs=2e-3)
+        assert motion_bound(world.arm, r, rho)[0] >= expected - 1e-12
 
 
 def test_a_disc_is_proved_exactly_when_the_spare_clearance_exceeds_the_bound():
     scene = make_scene([Obstacle("circle", (40.0, -20.0), 4.0)])
     tip, rho = np.array([30.0, 25.0]), 1.5
-    _, displacement = motion_bound(build_world(scene), float(np.hypot(*tip)), rho)
+    _, displacement = motion_bound(build_world(scene).arm, float(np.hypot(*tip)), rho)
     clearance = spare_cm(scene, build_world(scene, 0.0), tip[None])[0]
     for share, verdict in [(0.99, PROVED), (1.01, UNPROVED)]:
         assert disc_verdict(build_world(scene, clearance - displacement / share), *tip, rho) == verdict
@@ -126,7 +126,8 @@ def test_a_disc_that_holds_the_base_is_never_proved():
     world = build_world(make_scene())
     tip = np.array([0.0, 30.0])
     theta1 = poses(make_scene(), tip)[0]
-    world = world._replace(theta1_min_rad=theta1 - pi, theta1_max_rad=theta1 + pi, turn_start_rad=theta1 - pi)
+    whole_turn = world.arm._replace(theta1_min_rad=theta1 - pi, theta1_max_rad=theta1 + pi, turn_start_rad=theta1 - pi)
+    world = world._replace(arm=whole_turn)
     assert disc_verdict(world, *tip, 30.1) == UNPROVED
     assert disc_verdict(world, *tip, 10.0) == PROVED
 
@@ -189,9 +190,9 @@ def limit_is_near(scene, world, tip):
     """Within what the smallest disc can turn joint 1, at an edge of its limits or of reach."""
     theta1 = poses(scene, tip)[0, 0]
     r = float(np.linalg.norm(tip))
-    turn, _ = motion_bound(world, r, SMALLEST_CM)
-    near_limit = min(theta1 - world.theta1_min_rad, world.theta1_max_rad - theta1) <= turn
-    return near_limit or min(r - world.r_min_cm, world.r_max_cm - r) <= 0.05
+    turn, _ = motion_bound(world.arm, r, SMALLEST_CM)
+    near_limit = min(theta1 - world.arm.theta1_min_rad, world.arm.theta1_max_rad - theta1) <= turn
+    return near_limit or min(r - world.arm.r_min_cm, world.arm.r_max_cm - r) <= 0.05
 
 
 @pytest.mark.parametrize("seed", range(4))

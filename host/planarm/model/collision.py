@@ -45,21 +45,35 @@ def chain_clearance(joints_cm: NDArray[np.float64], obstacles: ObstacleSet) -> t
 def segment_clearance(
     ax: float, ay: float, bx: float, by: float, obstacles: ObstacleSet, best: float
 ) -> tuple[float, int]:
-    """Return (distance, index) of the obstacle nearest to segment ab, or (best, -1) when none is nearer than `best`.
+    """Return (distance in cm, index) of the obstacle nearest to ab, or (best, -1) when none is nearer than `best`."""
+    return two_link_clearance(ax, ay, bx, by, bx, by, obstacles, best)
+
+
+@kernel
+def two_link_clearance(
+    ax: float, ay: float, bx: float, by: float, cx: float, cy: float, obstacles: ObstacleSet, best: float
+) -> tuple[float, int]:
+    """Return (distance in cm, index) of the obstacle nearest to ab and bc, or (best, -1) when none is nearer.
 
     An obstacle whose bounding circle is not nearer than the best so far is passed over.
     """
+    # Each array is taken out of the tuple once: Numba counts a reference every time.
+    centers, radii = obstacles.centers_cm, obstacles.radii_cm
+    first_vertex, vertices = obstacles.first_vertex, obstacles.vertices_cm
     nearest = -1
-    for i in range(obstacles.radii_cm.shape[0]):
-        cx, cy, radius = obstacles.centers_cm[i, 0], obstacles.centers_cm[i, 1], obstacles.radii_cm[i]
-        to_center2 = point_segment_distance2(cx, cy, ax, ay, bx, by)
+    for i in range(radii.shape[0]):
+        x, y, radius = centers[i, 0], centers[i, 1], radii[i]
+        to_center2 = min(point_segment_distance2(x, y, ax, ay, bx, by), point_segment_distance2(x, y, bx, by, cx, cy))
         if to_center2 >= (best + radius) * (best + radius):
             continue
-        first, end = obstacles.first_vertex[i], obstacles.first_vertex[i + 1]
+        first, end = first_vertex[i], first_vertex[i + 1]
         if first == end:
             distance = max(0.0, sqrt(to_center2) - radius)
         else:
-            distance = segment_polygon_distance(ax, ay, bx, by, obstacles.vertices_cm, first, end)
+            distance = min(
+                segment_polygon_distance(ax, ay, bx, by, vertices, first, end),
+                segment_polygon_distance(bx, by, cx, cy, vertices, first, end),
+            )
         if distance < best:
             best, nearest = distance, i
     return best, nearest

@@ -10,11 +10,12 @@ from planarm.workspace.world import (
     FREE,
     INNER_HOLE,
     ArmWorld,
-    cos_elbow_angle,
-    distance_region,
-    elbow_position,
+    TwoLinkArm,
+    cos_beta_at,
+    elbow_at,
     floor_clearance,
     obstacle_clearance,
+    region_at,
     theta1_at,
     theta2_at,
 )
@@ -35,26 +36,27 @@ def check_task(scene: Scene, free_map: FreeMap) -> None:
 
 def pose_problem(scene: Scene, world: ArmWorld, tip_cm: Point) -> str:
     """Return what forbids the pose with the tip at a point and what to change, or an empty text."""
+    arm = world.arm
     x, y = tip_cm
-    r = hypot(x - world.base_x_cm, y - world.base_y_cm)
-    problem = _distance_problem(world, r)
+    r = hypot(x - arm.base_x_cm, y - arm.base_y_cm)
+    problem = _distance_problem(arm, r)
     if problem:
         return problem
-    ex, ey = elbow_position(world, x, y, r)
-    theta1 = theta1_at(world, x, y, acos(cos_elbow_angle(world, r)))
+    ex, ey = elbow_at(arm, x, y, r)
+    theta1 = theta1_at(arm, x, y, acos(cos_beta_at(arm, r)))
     distance, nearest = obstacle_clearance(world, ex, ey, x, y)
-    height = floor_clearance(world, ey, y)
-    keep = f"{world.margin_cm:.4g} cm are to be kept (half of arm.link_width_cm, workspace.clearance_cm, allowances)"
-    if not world.theta1_min_rad <= theta1 <= world.theta1_max_rad:
-        limits = f"[{degrees(world.theta1_min_rad):.6g}, {degrees(world.theta1_max_rad):.6g}]"
+    height = floor_clearance(arm, ey, y)
+    keep = f"{arm.margin_cm:.4g} cm are to be kept (half of arm.link_width_cm, workspace.clearance_cm, allowances)"
+    if not arm.theta1_min_rad <= theta1 <= arm.theta1_max_rad:
+        limits = f"[{degrees(arm.theta1_min_rad):.6g}, {degrees(arm.theta1_max_rad):.6g}]"
         return (
             f"needs joint 1 at {degrees(theta1):.2f} degrees, its limits are {limits}; "
             "move the point, change arm.elbow, or widen arm.joint_limits_deg"
         )
-    if distance <= world.margin_cm:
+    if distance <= arm.margin_cm:
         obstacle = f"obstacles[{nearest + 1}] ({scene.obstacles[nearest].shape})"
         return f"puts a link's centre line {distance:.3f} cm from {obstacle}, more than {keep}; move one of them"
-    if height <= world.margin_cm:
+    if height <= arm.margin_cm:
         return (
             f"puts elbow or tip {height:.3f} cm above the floor y = 0, more than {keep}; "
             "move the point, change arm.elbow, or set arm.floor = false"
@@ -62,21 +64,21 @@ def pose_problem(scene: Scene, world: ArmWorld, tip_cm: Point) -> str:
     return ""
 
 
-def _distance_problem(world: ArmWorld, r_cm: float) -> str:
+def _distance_problem(arm: TwoLinkArm, r_cm: float) -> str:
     """Return what forbids the tip's distance from the base, or an empty text."""
-    region = distance_region(world, r_cm)
+    region = region_at(arm, r_cm)
     if region == FREE:
         return ""
     place = f"is {r_cm:.3f} cm from the base"
     if region == BEYOND_REACH:
-        return f"{place}, out of reach: the links reach {world.reach_cm:g} cm (arm.link_lengths_cm); move it nearer"
+        return f"{place}, out of reach: the links reach {arm.reach_cm:g} cm (arm.link_lengths_cm); move it nearer"
     if region == INNER_HOLE:
         return (
-            f"{place}, inside the inner hole of {world.r_min_cm:.3f} cm that the links and the limits of joint 2 leave "
+            f"{place}, inside the inner hole of {arm.r_min_cm:.3f} cm that the links and the limits of joint 2 leave "
             "(arm.link_lengths_cm, arm.joint_limits_deg); move it farther out"
         )
     return (
-        f"{place} and needs joint 2 at {degrees(theta2_at(world, r_cm)):.2f} degrees, its limits end at "
-        f"{degrees(theta2_at(world, world.r_max_cm)):.2f}, that is {world.r_max_cm:.3f} cm; "
+        f"{place} and needs joint 2 at {degrees(theta2_at(arm, r_cm)):.2f} degrees, its limits end at "
+        f"{degrees(theta2_at(arm, arm.r_max_cm)):.2f}, that is {arm.r_max_cm:.3f} cm; "
         "move the point nearer or widen arm.joint_limits_deg"
     )

@@ -6,7 +6,7 @@ tip in it (`planarm.workspace.proof` has the bound).
 """
 
 from dataclasses import dataclass
-from math import acos, hypot, sqrt
+from math import acos, hypot, nan, sqrt
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,18 +14,18 @@ from planarm_wire.kernel_cache import kernel
 
 from planarm.model.kinematics import ElbowSide
 from planarm.scene import Scene
-from planarm.workspace.proof import PROVED, disc_verdict, disc_within_reach
+from planarm.workspace.proof import disc_is_free, disc_within_reach
 from planarm.workspace.world import (
     FREE,
     LIMIT,
     OBSTACLE,
     ArmWorld,
     build_world,
-    cos_elbow_angle,
-    distance_region,
-    elbow_position,
+    cos_beta_at,
+    elbow_at,
     floor_clearance,
     obstacle_clearance,
+    region_at,
     theta1_at,
     theta2_at,
 )
@@ -98,8 +98,8 @@ def build_free_map(scene: Scene, margin_cm: float | None = None, elbow: ElbowSid
         theta_rad=theta_rad,
         clearance_cm=clearance_cm,
         cell_cm=cell_cm,
-        margin_cm=world.margin_cm,
-        elbow="up" if world.side > 0.0 else "down",
+        margin_cm=world.arm.margin_cm,
+        elbow="up" if world.arm.side > 0.0 else "down",
         world=world,
     )
 
@@ -116,35 +116,35 @@ def _fill(
     clearance_cm: NDArray[np.float64],
 ) -> None:
     """Fill the node arrays; `rho_cm` is the radius of a cell's circumscribed circle."""
+    arm = world.arm
     for iy in range(y_cm.shape[0]):
         for ix in range(x_cm.shape[0]):
-            node, theta1, theta2, clearance = _node(world, x_cm[ix], y_cm[iy])
+            x, y = x_cm[ix], y_cm[iy]
+            r = hypot(x - arm.base_x_cm, y - arm.base_y_cm)
+            node = region_at(arm, r)
+            theta1, theta2, clearance = nan, nan, nan
+            if node == FREE:
+                theta1, theta2 = theta1_at(arm, x, y, acos(cos_beta_at(arm, r))), theta2_at(arm, r)
+                node, clearance = _pose_region(world, x, y, r, theta1)
             region[iy, ix] = node
             theta_rad[iy, ix, 0], theta_rad[iy, ix, 1] = theta1, theta2
             clearance_cm[iy, ix] = clearance
-            whole[iy, ix] = node == FREE and _whole(world, x_cm[ix], y_cm[iy], rho_cm)
+            spare = clearance - arm.margin_cm
+            whole[iy, ix] = (
+                node == FREE and disc_within_reach(arm, r, rho_cm) and disc_is_free(arm, r, rho_cm, theta1, spare)
+            )
 
 
 @kernel
-def _node(world: ArmWorld, x: float, y: float) -> tuple[int, float, float, float]:
-    """Return (region, theta1, theta2, clearance) of the tip position (x, y)."""
-    r = hypot(x - world.base_x_cm, y - world.base_y_cm)
-    node = distance_region(world, r)
-    if node != FREE:
-        return node, np.nan, np.nan, np.nan
-    ex, ey = elbow_position(world, x, y, r)
-    theta1 = theta1_at(world, x, y, acos(cos_elbow_angle(world, r)))
+def _pose_region(world: ArmWorld, x: float, y: float, r: float, theta1: float) -> tuple[int, float]:
+    """Return (region, clearance) of a tip position within reach."""
+    arm = world.arm
+    ex, ey = elbow_at(arm, x, y, r)
     to_obstacle, _ = obstacle_clearance(world, ex, ey, x, y)
-    to_floor = floor_clearance(world, ey, y)
-    if to_obstacle <= world.margin_cm:
-        node = OBSTACLE
-    if to_floor <= world.margin_cm or theta1 < world.theta1_min_rad or theta1 > world.theta1_max_rad:
-        node = LIMIT
-    return node, theta1, theta2_at(world, r), min(to_obstacle, to_floor)
-
-
-@kernel
-def _whole(world: ArmWorld, x: float, y: float, rho_cm: float) -> bool:
-    """Tell whether every pose with the tip in the disc around (x, y) is free."""
-    r = hypot(x - world.base_x_cm, y - world.base_y_cm)
-    return disc_within_reach(world, r, rho_cm) and disc_verdict(world, x, y, rho_cm) == PROVED
+    to_floor = floor_clearance(arm, ey, y)
+    region = FREE
+    if to_obstacle <= arm.margin_cm:
+        region = OBSTACLE
+    if to_floor <= arm.margin_cm or theta1 < arm.theta1_min_rad or theta1 > arm.theta1_max_rad:
+        region = LIMIT
+    return region, min(to_obstacle, to_floor)

@@ -21,11 +21,12 @@ from planarm.model.kinematics import ROUNDING_CM
 from planarm.workspace.world import (
     FREE,
     ArmWorld,
-    cos_elbow_angle,
-    distance_region,
-    elbow_position,
+    TwoLinkArm,
+    cos_beta_at,
+    elbow_at,
     floor_clearance,
     obstacle_clearance,
+    region_at,
     theta1_at,
 )
 
@@ -37,24 +38,42 @@ SMALLEST_CM = 1e-3
 
 
 @kernel
-def motion_bound(world: ArmWorld, r_cm: float, rho_cm: float) -> tuple[float, float]:
+def motion_bound(arm: TwoLinkArm, r_cm: float, rho_cm: float) -> tuple[float, float]:
     """Return bounds (of theta1's change in rad, of any point's displacement in cm) while the tip stays in a disc.
 
     Args:
-        world: the arm.
+        arm: the arm.
         r_cm: distance of the disc's centre from the base, within reach and limits.
         rho_cm: the disc's radius.
     """
-    low, high = max(r_cm - rho_cm, world.r_min_cm), min(r_cm + rho_cm, world.r_max_cm)
-    beta = acos(cos_elbow_angle(world, r_cm))
-    beta_low, beta_high = acos(cos_elbow_angle(world, low)), acos(cos_elbow_angle(world, high))
-    dbeta = max(abs(beta_low - beta), abs(beta_high - beta))
-    extreme2 = world.l1_cm * world.l1_cm - world.l2_cm * world.l2_cm
+    low, high = max(r_cm - rho_cm, arm.r_min_cm), min(r_cm + rho_cm, arm.r_max_cm)
+    beta = acos(cos_beta_at(arm, r_cm))
+    dbeta = max(abs(acos(cos_beta_at(arm, low)) - beta), abs(acos(cos_beta_at(arm, high)) - beta))
+    extreme2 = arm.l1_cm * arm.l1_cm - arm.l2_cm * arm.l2_cm
     if low * low < extreme2 < high * high:
-        dbeta = max(dbeta, abs(acos(cos_elbow_angle(world, sqrt(extreme2))) - beta))
+        dbeta = max(dbeta, abs(acos(cos_beta_at(arm, sqrt(extreme2))) - beta))
     dphi = asin(rho_cm / r_cm) if rho_cm < r_cm else pi
     dtheta1 = min(pi, dphi + dbeta)
-    return dtheta1, max(rho_cm, 2.0 * world.l1_cm * sin(0.5 * dtheta1))
+    return dtheta1, max(rho_cm, 2.0 * arm.l1_cm * sin(0.5 * dtheta1))
+
+
+@kernel
+def disc_is_free(arm: TwoLinkArm, r_cm: float, rho_cm: float, theta1_rad: float, spare_cm: float) -> bool:
+    """Tell whether all poses with the tip in a disc are free, as far as the tips are within reach and theta2's limits.
+
+    A disc that holds the base never is.
+
+    Args:
+        arm: the arm.
+        r_cm: distance of the disc's centre from the base.
+        rho_cm: the disc's radius.
+        theta1_rad: joint 1 at the centre.
+        spare_cm: clearance beyond the margin at the centre.
+    """
+    dtheta1, displacement = motion_bound(arm, r_cm, rho_cm)
+    if theta1_rad - dtheta1 < arm.theta1_min_rad or theta1_rad + dtheta1 > arm.theta1_max_rad:
+        return False
+    return rho_cm < r_cm and spare_cm > displacement + ROUNDING_CM
 
 
 @kernel
@@ -63,25 +82,23 @@ def disc_verdict(world: ArmWorld, x_cm: float, y_cm: float, rho_cm: float) -> in
 
     BLOCKED means that the pose at the centre is not free. A disc that holds the base is never proved.
     """
-    r = hypot(x_cm - world.base_x_cm, y_cm - world.base_y_cm)
-    if distance_region(world, r) != FREE:
+    arm = world.arm
+    r = hypot(x_cm - arm.base_x_cm, y_cm - arm.base_y_cm)
+    if region_at(arm, r) != FREE:
         return BLOCKED
-    ex, ey = elbow_position(world, x_cm, y_cm, r)
+    ex, ey = elbow_at(arm, x_cm, y_cm, r)
     distance, _ = obstacle_clearance(world, ex, ey, x_cm, y_cm)
-    spare = min(distance, floor_clearance(world, ey, y_cm)) - world.margin_cm
-    theta1 = theta1_at(world, x_cm, y_cm, acos(cos_elbow_angle(world, r)))
-    if spare <= 0.0 or theta1 < world.theta1_min_rad or theta1 > world.theta1_max_rad:
+    spare = min(distance, floor_clearance(arm, ey, y_cm)) - arm.margin_cm
+    theta1 = theta1_at(arm, x_cm, y_cm, acos(cos_beta_at(arm, r)))
+    if spare <= 0.0 or theta1 < arm.theta1_min_rad or theta1 > arm.theta1_max_rad:
         return BLOCKED
-    dtheta1, displacement = motion_bound(world, r, rho_cm)
-    if theta1 - dtheta1 < world.theta1_min_rad or theta1 + dtheta1 > world.theta1_max_rad:
-        return UNPROVED
-    return PROVED if rho_cm < r and spare > displacement + ROUNDING_CM else UNPROVED
+    return PROVED if disc_is_free(arm, r, rho_cm, theta1, spare) else UNPROVED
 
 
 @kernel
-def disc_within_reach(world: ArmWorld, r_cm: float, rho_cm: float) -> bool:
+def disc_within_reach(arm: TwoLinkArm, r_cm: float, rho_cm: float) -> bool:
     """Tell whether every point of a disc, its centre r from the base, is within reach and the limits of theta2."""
-    return r_cm - rho_cm >= world.r_min_cm and r_cm + rho_cm <= world.r_max_cm
+    return r_cm - rho_cm >= arm.r_min_cm and r_cm + rho_cm <= arm.r_max_cm
 
 
 @kernel
@@ -103,13 +120,14 @@ def prove_line(world: ArmWorld, x0: float, y0: float, x1: float, y1: float) -> t
         (verdict, parameter): PROVED; or BLOCKED with the share of the move, 0 to 1, at which the pose is not free; or
         UNPROVED with the share around which the margin is too small for a proof.
     """
+    arm = world.arm
     dx, dy = x1 - x0, y1 - y0
     length = hypot(dx, dy)
-    toward_base = (world.base_x_cm - x0) * dx + (world.base_y_cm - y0) * dy
+    toward_base = (arm.base_x_cm - x0) * dx + (arm.base_y_cm - y0) * dy
     nearest = min(1.0, max(0.0, toward_base / (length * length))) if length > 0.0 else 0.0
     for share in (0.0, 1.0, nearest):
-        r = hypot(x0 + share * dx - world.base_x_cm, y0 + share * dy - world.base_y_cm)
-        if distance_region(world, r) != FREE:
+        r = hypot(x0 + share * dx - arm.base_x_cm, y0 + share * dy - arm.base_y_cm)
+        if region_at(arm, r) != FREE:
             return BLOCKED, share
     start, width = 0.0, 1.0
     while start < 1.0:
@@ -141,7 +159,7 @@ def prove_curve(world: ArmWorld, x0: float, y0: float, x1: float, y1: float, x2:
         mx, my = 0.25 * (ax + 2.0 * bx + cx), 0.25 * (ay + 2.0 * by + cy)
         rho = max(hypot(ax - mx, ay - my), hypot(bx - mx, by - my), hypot(cx - mx, cy - my))
         verdict = disc_verdict(world, mx, my, rho)
-        if verdict == PROVED and not triangle_within_reach(world, ax, ay, bx, by, cx, cy):
+        if verdict == PROVED and not triangle_within_reach(world.arm, ax, ay, bx, by, cx, cy):
             verdict = UNPROVED
         if verdict == PROVED:
             start, width = next_piece(start, width)
@@ -169,13 +187,13 @@ def blossom(p0: float, p1: float, p2: float, s: float, t: float) -> float:
 
 
 @kernel
-def triangle_within_reach(world: ArmWorld, ax: float, ay: float, bx: float, by: float, cx: float, cy: float) -> bool:
+def triangle_within_reach(arm: TwoLinkArm, ax: float, ay: float, bx: float, by: float, cx: float, cy: float) -> bool:
     """Tell whether every point of a triangle that does not hold the base is within reach and the limits of theta2."""
-    ox, oy = world.base_x_cm, world.base_y_cm
+    ox, oy = arm.base_x_cm, arm.base_y_cm
     farthest = max(hypot(ax - ox, ay - oy), hypot(bx - ox, by - oy), hypot(cx - ox, cy - oy))
     nearest2 = min(
         point_segment_distance2(ox, oy, ax, ay, bx, by),
         point_segment_distance2(ox, oy, bx, by, cx, cy),
         point_segment_distance2(ox, oy, cx, cy, ax, ay),
     )
-    return distance_region(world, farthest) == FREE and distance_region(world, sqrt(nearest2)) == FREE
+    return region_at(arm, farthest) == FREE and region_at(arm, sqrt(nearest2)) == FREE

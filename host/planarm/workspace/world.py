@@ -14,7 +14,7 @@ from planarm_wire.kernel_cache import kernel
 
 from planarm.errors import SceneError
 from planarm.model.arm import Arm
-from planarm.model.collision import segment_clearance
+from planarm.model.collision import two_link_clearance
 from planarm.model.kinematics import ROUNDING_CM, ElbowSide, turn_start_rad
 from planarm.model.shapes import ObstacleSet, obstacle_set, shape_of
 from planarm.scene import ArmSpec, Scene
@@ -26,8 +26,8 @@ SINGULAR_CM = 1e-6
 FREE, BEYOND_REACH, INNER_HOLE, OBSTACLE, LIMIT = 0, 1, 2, 3, 4
 
 
-class ArmWorld(NamedTuple):
-    """A two-link arm on one elbow side, its limits and its obstacles; lengths in cm, angles in radians."""
+class TwoLinkArm(NamedTuple):
+    """A two-link arm on one elbow side with its limits, as plain numbers: cm and radians."""
 
     l1_cm: float
     l2_cm: float
@@ -46,7 +46,47 @@ class ArmWorld(NamedTuple):
     margin_cm: float
     """A pose is free when its clearance exceeds this."""
     floor: bool
+
+
+class ArmWorld(NamedTuple):
+    """The arm among its obstacles.
+
+    Kernels that need no obstacle take `arm`: Numba counts references to all arrays of a tuple at every call, which
+    costs more than the arithmetic.
+    """
+
+    arm: TwoLinkArm
     obstacles: ObstacleSet
+
+    @property
+    def l1_cm(self) -> float:
+        """Length of link 1."""
+        return self.arm.l1_cm
+
+    @property
+    def l2_cm(self) -> float:
+        """Length of link 2."""
+        return self.arm.l2_cm
+
+    @property
+    def base_x_cm(self) -> float:
+        """The base's x."""
+        return self.arm.base_x_cm
+
+    @property
+    def base_y_cm(self) -> float:
+        """The base's y."""
+        return self.arm.base_y_cm
+
+    @property
+    def turn_start_rad(self) -> float:
+        """Where theta1's turn begins."""
+        return self.arm.turn_start_rad
+
+    @property
+    def margin_cm(self) -> float:
+        """A pose is free when its clearance exceeds this."""
+        return self.arm.margin_cm
 
 
 def elbow_sides(spec: ArmSpec) -> tuple[ElbowSide, ...]:
@@ -74,7 +114,7 @@ def build_world(scene: Scene, margin_cm: float | None = None, elbow: ElbowSide |
     arm = Arm.from_spec(scene.arm)
     l1, l2 = arm.link_lengths_cm
     r_min, r_max = _tip_distances_cm(scene, side)
-    return ArmWorld(
+    numbers = TwoLinkArm(
         l1_cm=l1,
         l2_cm=l2,
         base_x_cm=arm.base_cm[0],
@@ -88,8 +128,8 @@ def build_world(scene: Scene, margin_cm: float | None = None, elbow: ElbowSide |
         theta1_max_rad=arm.joint_limits_rad[0][1],
         margin_cm=scene.margin_cm if margin_cm is None else margin_cm,
         floor=scene.arm.floor,
-        obstacles=obstacle_set([shape_of(obstacle) for obstacle in scene.obstacles]),
     )
+    return ArmWorld(numbers, obstacle_set([shape_of(obstacle) for obstacle in scene.obstacles]))
 
 
 def _tip_distances_cm(scene: Scene, side: ElbowSide) -> tuple[float, float]:
@@ -109,46 +149,46 @@ def _tip_distance_cm(l1: float, l2: float, theta2_rad: float) -> float:
 
 
 @kernel
-def elbow_position(world: ArmWorld, x_cm: float, y_cm: float, r_cm: float) -> tuple[float, float]:
+def elbow_at(arm: TwoLinkArm, x_cm: float, y_cm: float, r_cm: float) -> tuple[float, float]:
     """Return the elbow's (x, y) for a tip at (x, y), at distance r from the base."""
-    cos_beta = cos_elbow_angle(world, r_cm)
-    sin_beta = world.side * sqrt(max(0.0, 1.0 - cos_beta * cos_beta))
-    ux, uy = (x_cm - world.base_x_cm) / r_cm, (y_cm - world.base_y_cm) / r_cm
+    cos_beta = cos_beta_at(arm, r_cm)
+    sin_beta = arm.side * sqrt(max(0.0, 1.0 - cos_beta * cos_beta))
+    ux, uy = (x_cm - arm.base_x_cm) / r_cm, (y_cm - arm.base_y_cm) / r_cm
     return (
-        world.base_x_cm + world.l1_cm * (ux * cos_beta - uy * sin_beta),
-        world.base_y_cm + world.l1_cm * (uy * cos_beta + ux * sin_beta),
+        arm.base_x_cm + arm.l1_cm * (ux * cos_beta - uy * sin_beta),
+        arm.base_y_cm + arm.l1_cm * (uy * cos_beta + ux * sin_beta),
     )
 
 
 @kernel
-def cos_elbow_angle(world: ArmWorld, r_cm: float) -> float:
+def cos_beta_at(arm: TwoLinkArm, r_cm: float) -> float:
     """Return cos beta: beta is the angle at the base from the tip's direction to link 1, by the law of cosines."""
-    l1, l2 = world.l1_cm, world.l2_cm
+    l1, l2 = arm.l1_cm, arm.l2_cm
     return min(1.0, max(-1.0, (r_cm * r_cm + l1 * l1 - l2 * l2) / (2.0 * r_cm * l1)))
 
 
 @kernel
-def theta1_at(world: ArmWorld, x_cm: float, y_cm: float, beta_rad: float) -> float:
+def theta1_at(arm: TwoLinkArm, x_cm: float, y_cm: float, beta_rad: float) -> float:
     """Return theta1 in [turn_start_rad, turn_start_rad + 2 pi) for a tip at (x, y)."""
-    theta1 = atan2(y_cm - world.base_y_cm, x_cm - world.base_x_cm) + world.side * beta_rad
-    return theta1 - 2.0 * pi * floor((theta1 - world.turn_start_rad) / (2.0 * pi))
+    theta1 = atan2(y_cm - arm.base_y_cm, x_cm - arm.base_x_cm) + arm.side * beta_rad
+    return theta1 - 2.0 * pi * floor((theta1 - arm.turn_start_rad) / (2.0 * pi))
 
 
 @kernel
-def theta2_at(world: ArmWorld, r_cm: float) -> float:
+def theta2_at(arm: TwoLinkArm, r_cm: float) -> float:
     """Return theta2 for a tip at distance r from the base."""
-    l1, l2 = world.l1_cm, world.l2_cm
-    return -world.side * acos(min(1.0, max(-1.0, (r_cm * r_cm - l1 * l1 - l2 * l2) / (2.0 * l1 * l2))))
+    l1, l2 = arm.l1_cm, arm.l2_cm
+    return -arm.side * acos(min(1.0, max(-1.0, (r_cm * r_cm - l1 * l1 - l2 * l2) / (2.0 * l1 * l2))))
 
 
 @kernel
-def distance_region(world: ArmWorld, r_cm: float) -> int:
+def region_at(arm: TwoLinkArm, r_cm: float) -> int:
     """Return the region that a tip's distance from the base alone decides, FREE when it forbids nothing."""
-    if r_cm < world.r_min_cm - ROUNDING_CM:
+    if r_cm < arm.r_min_cm - ROUNDING_CM:
         return INNER_HOLE
-    if r_cm > world.reach_cm + ROUNDING_CM:
+    if r_cm > arm.reach_cm + ROUNDING_CM:
         return BEYOND_REACH
-    if r_cm > world.r_max_cm + ROUNDING_CM:
+    if r_cm > arm.r_max_cm + ROUNDING_CM:
         return LIMIT
     return FREE
 
@@ -156,32 +196,41 @@ def distance_region(world: ArmWorld, r_cm: float) -> int:
 @kernel
 def obstacle_clearance(world: ArmWorld, ex: float, ey: float, x: float, y: float) -> tuple[float, int]:
     """Return (distance in cm, index) of the obstacle nearest to the links, given elbow and tip; (inf, -1) for none."""
-    first, nearest = segment_clearance(world.base_x_cm, world.base_y_cm, ex, ey, world.obstacles, inf)
-    second, index = segment_clearance(ex, ey, x, y, world.obstacles, first)
-    if second < first:
-        return second, index
-    return first, nearest
+    return two_link_clearance(world.arm.base_x_cm, world.arm.base_y_cm, ex, ey, x, y, world.obstacles, inf)
 
 
 @kernel
-def floor_clearance(world: ArmWorld, ey: float, y: float) -> float:
+def distance_region(world: ArmWorld, r_cm: float) -> int:
+    """Return the region that a tip's distance from the base alone decides, FREE when it forbids nothing."""
+    return region_at(world.arm, r_cm)
+
+
+@kernel
+def elbow_position(world: ArmWorld, x_cm: float, y_cm: float, r_cm: float) -> tuple[float, float]:
+    """Return the elbow's (x, y) for a tip at (x, y), at distance r from the base."""
+    return elbow_at(world.arm, x_cm, y_cm, r_cm)
+
+
+@kernel
+def floor_clearance(arm: TwoLinkArm, ey: float, y: float) -> float:
     """Return the height in cm of the lower of elbow and tip above y = 0, or infinity when the scene has no floor.
 
     The base is mounted on or above the floor, so these two ends are the lowest points of link 1's moving end and of
     link 2.
     """
-    return min(ey, y) if world.floor else inf
+    return min(ey, y) if arm.floor else inf
 
 
 @kernel
 def _clearances(world: ArmWorld, q_rad: NDArray[np.float64], out: NDArray[np.float64]) -> None:
+    arm = world.arm
     for i in range(q_rad.shape[0]):
         theta1, heading2 = q_rad[i, 0], q_rad[i, 0] + q_rad[i, 1]
-        ex = world.base_x_cm + world.l1_cm * cos(theta1)
-        ey = world.base_y_cm + world.l1_cm * sin(theta1)
-        x, y = ex + world.l2_cm * cos(heading2), ey + world.l2_cm * sin(heading2)
+        ex = arm.base_x_cm + arm.l1_cm * cos(theta1)
+        ey = arm.base_y_cm + arm.l1_cm * sin(theta1)
+        x, y = ex + arm.l2_cm * cos(heading2), ey + arm.l2_cm * sin(heading2)
         distance, _ = obstacle_clearance(world, ex, ey, x, y)
-        out[i] = min(distance, floor_clearance(world, ey, y))
+        out[i] = min(distance, floor_clearance(arm, ey, y))
 
 
 def clearances_cm(world: ArmWorld, q_rad: NDArray[np.float64]) -> NDArray[np.float64]:
