@@ -8,16 +8,7 @@ import numpy as np
 from planarm.scene import Point
 from planarm.workspace.free_map import FreeMap
 from planarm.workspace.proof import PROVED, prove_line
-from planarm.workspace.world import (
-    BEYOND_REACH,
-    FREE,
-    INNER_HOLE,
-    LIMIT,
-    OBSTACLE,
-    distance_region,
-    elbow_position,
-    obstacle_clearance,
-)
+from planarm.workspace.world import BEYOND_REACH, FREE, INNER_HOLE, LIMIT, OBSTACLE, region_at
 
 ON_NODE_CM = 1e-9
 """A point this near to a node is the node: rounding, not geometry."""
@@ -28,9 +19,9 @@ JOIN_CELLS = 3
 _FORBIDDEN = {
     BEYOND_REACH: "is beyond the arm's reach",
     INNER_HOLE: "is nearer to the base than the links and the limits of joint 2 allow",
-    OBSTACLE: "brings a link to within {margin:g} cm of an obstacle, which is the margin (arm.link_width_cm / 2 plus "
-    "workspace.clearance_cm and what the planner adds)",
-    LIMIT: "needs a joint beyond arm.joint_limits_deg, or a link below the floor",
+    OBSTACLE: "brings a link's centre line to within {margin:g} cm of an obstacle (half of arm.link_width_cm, "
+    "workspace.clearance_cm, allowances)",
+    LIMIT: "needs a joint beyond arm.joint_limits_deg or a link below the floor",
 }
 
 
@@ -54,11 +45,9 @@ def endpoint(free_map: FreeMap, name: str, point_cm: Point) -> Endpoint:
     x_cm, y_cm = column * free_map.cell_cm, row * free_map.cell_cm
     on_node = hypot(point_cm[0] - x_cm, point_cm[1] - y_cm) <= ON_NODE_CM
     here = f"{name} ({point_cm[0]:g}, {point_cm[1]:g}) cm"
-    region = _node_region(free_map, column, row) if on_node else _point_region(free_map, point_cm)
-    if region is None:
-        return Endpoint(point_cm, problem=f"The {here} lies outside workspace.x_cm or workspace.y_cm.")
-    if region != FREE:
-        return Endpoint(point_cm, problem=f"The {here} {_FORBIDDEN[region].format(margin=free_map.margin_cm)}.")
+    problem = _node_problem(free_map, column, row) if on_node else _point_problem(free_map, point_cm)
+    if problem:
+        return Endpoint(point_cm, problem=f"The {here} {problem.format(margin=free_map.margin_cm)}.")
     if on_node:
         return Endpoint(point_cm, column, row, on_node=True)
     for column, row in _near_free_nodes(free_map, point_cm):
@@ -79,23 +68,26 @@ def _node_region(free_map: FreeMap, column: int, row: int) -> int | None:
     return int(free_map.region[iy, ix]) if 0 <= ix < columns and 0 <= iy < rows else None
 
 
+def _node_problem(free_map: FreeMap, column: int, row: int) -> str:
+    """Return what forbids the pose at a node, or an empty text."""
+    region = _node_region(free_map, column, row)
+    if region is None:
+        return "lies outside workspace.x_cm or workspace.y_cm"
+    return _FORBIDDEN.get(region, "")
+
+
 def _first(free_map: FreeMap) -> tuple[int, int]:
     """Return column and row of the map's first node."""
     return round(float(free_map.x_cm[0]) / free_map.cell_cm), round(float(free_map.y_cm[0]) / free_map.cell_cm)
 
 
-def _point_region(free_map: FreeMap, point_cm: Point) -> int:
-    """Return the region of any point, by the rules that the map's nodes follow."""
-    world = free_map.world
-    if prove_line(world, *point_cm, *point_cm)[0] == PROVED:
-        return FREE
-    r_cm = hypot(point_cm[0] - world.base_x_cm, point_cm[1] - world.base_y_cm)
-    region = int(distance_region(world, r_cm))
-    if region != FREE:
-        return region
-    elbow_cm = elbow_position(world, *point_cm, r_cm)
-    distance_cm, _ = obstacle_clearance(world, *elbow_cm, *point_cm)
-    return OBSTACLE if distance_cm <= world.margin_cm else LIMIT
+def _point_problem(free_map: FreeMap, point_cm: Point) -> str:
+    """Return what forbids the pose with the tip at any point, or an empty text."""
+    if prove_line(free_map.world, *point_cm, *point_cm)[0] == PROVED:
+        return ""
+    arm = free_map.world.arm
+    region = int(region_at(arm, hypot(point_cm[0] - arm.base_x_cm, point_cm[1] - arm.base_y_cm)))
+    return _FORBIDDEN[region] if region != FREE else f"{_FORBIDDEN[OBSTACLE]}, or {_FORBIDDEN[LIMIT]}"
 
 
 def _near_free_nodes(free_map: FreeMap, point_cm: Point) -> list[tuple[int, int]]:

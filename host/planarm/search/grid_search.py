@@ -99,7 +99,7 @@ def _why_no_path(
         lattice = make_lattice(free_map, border=int(np.abs(offsets).max()))
         if _search(free_map, lattice, offsets, replace(planner, moves="nodes"), start, goal).nodes:
             return text + (
-                " The nodes do connect, but the arm's move between some of them is blocked or its room too small "
-                "to be proved: a smaller workspace.cell_cm or workspace.clearance_cm may help."
+                " The nodes do connect, but between some of them the arm's move is blocked, runs over a joint's limit, "
+                "or has too little room for a proof: a smaller workspace.cell_cm or workspace.clearance_cm may help."
             )
     return text + " The free space around start and goal is not connected."

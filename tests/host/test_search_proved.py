@@ -1,0 +1,203 @@
+"""Proved moves: the arm never comes nearer than the margin, judged by kinematics and geometry of the tests' own."""
+
+from functools import cache
+from itertools import pairwise
+from math import hypot, inf
+
+import numpy as np
+import pytest
+import shapely
+from host_scenes import make_scene, random_obstacles
+from planarm.model.shapes import Circle, shape_of
+from planarm.search.best_first import line_is_free
+from planarm.search.grid_search import find_path
+from planarm.search.lattice import make_lattice, node_at
+from planarm.search.result import SearchStatus
+from planarm.search.stencils import cover, stencil
+from planarm.workspace.free_map import build_free_map
+from planarm.workspace.proof import PROVED, prove_line
+from planarm.workspace.world import FREE
+from scipy.ndimage import label
+from scipy.sparse import csr_matrix
+from scipy.sparse.csgraph import dijkstra
+from search_maps import EXACT, PLANNERS, planner, table1_scene
+
+SAMPLE_CM = 0.02
+CASES = range(14)
+
+
+def links(scene, tips):
+    """Return both links as line strings, the tips' distances from the base, and theta1 within its limits' turn.
+
+    The elbow is where the links' circles meet, on the side that the scene names.
+    """
+    l1, l2 = scene.arm.link_lengths_cm
+    base = np.array(scene.arm.base_cm)
+    to_tip = tips - base
+    r = np.hypot(*to_tip.T)
+    along = (r**2 + l1**2 - l2**2) / (2.0 * r)
+    aside = np.sqrt(np.maximum(0.0, l1**2 - along**2))
+    unit = to_tip / r[:, None]
+    left = np.column_stack([-unit[:, 1], unit[:, 0]])
+    side = 1.0 if scene.arm.elbow == "up" else -1.0  # theta2 < 0 turns right at the elbow, so the elbow lies left
+    elbows = base + along[:, None] * unit + side * aside[:, None] * left
+    first = np.stack([np.broadcast_to(base, elbows.shape), elbows], axis=1)
+    turn_start = scene.arm.joint_limits_rad[0][0]
+    theta1 = (np.arctan2(*(elbows - base).T[::-1]) - turn_start) % (2.0 * np.pi) + turn_start
+    return shapely.linestrings(first), shapely.linestrings(np.stack([elbows, tips], axis=1)), r, theta1
+
+
+def least_clearance_cm(scene, points_cm):
+    """Least distance of any link to any obstacle along straight moves between the points.
+
+    -inf where the arm cannot reach or joint 1, whose range is one turn, would have to jump from one limit to the other.
+    """
+    tips = [points_cm[:1]]
+    for a, b in pairwise(points_cm):
+        steps = int(np.ceil(np.hypot(*(b - a)) / SAMPLE_CM)) + 1
+        tips.append(a + np.linspace(0.0, 1.0, steps + 1)[1:, None] * (b - a))
+    first, second, r, theta1 = links(scene, np.concatenate(tips))
+    least, most = abs(np.diff(scene.arm.link_lengths_cm))[0], sum(scene.arm.link_lengths_cm)
+    if r.min() < least - 1e-9 or r.max() > most + 1e-9 or np.abs(np.diff(theta1)).max(initial=0.0) > np.pi:
+        return -inf
+    clearance = inf
+    for shape in map(shape_of, scene.obstacles):
+        filled = shapely.Point(shape.center_cm) if isinstance(shape, Circle) else shapely.Polygon(shape.vertices_cm)
+        radius = shape.radius_cm if isinstance(shape, Circle) else 0.0
+        clearance = min(clearance, *(shapely.distance(link, filled).min() - radius for link in (first, second)))
+    return clearance
+
+
+@cache
+def random_case(seed):
+    """A random scene with its map, and two nodes far apart in the largest connected part of its free space."""
+    rng = np.random.default_rng(seed)
+    elbow = ("up", "down")[seed % 2]
+    scene = make_scene(random_obstacles(rng, int(rng.integers(2, 7))), elbow=elbow, cell=(1.0, 2.0)[seed % 2])
+    free_map = build_free_map(scene)
+    parts, _ = label(free_map.region == FREE, np.ones((3, 3)))
+    iy, ix = np.nonzero(parts == np.argmax(np.bincount(parts[parts > 0])))
+    nodes = np.column_stack([free_map.x_cm[ix], free_map.y_cm[iy]])
+    start = nodes[rng.integers(len(nodes))]
+    goal = nodes[np.argsort(np.hypot(*(nodes - start).T))[int(0.8 * len(nodes))]]
+    return scene, free_map, tuple(map(float, start)), tuple(map(float, goal))
+
+
+@pytest.mark.parametrize(("algorithm", "neighbours"), PLANNERS)
+@pytest.mark.parametrize("seed", CASES)
+def test_a_proved_path_keeps_more_than_the_margin_everywhere(algorithm, neighbours, seed):
+    scene, free_map, start_cm, goal_cm = random_case(seed)
+    result = find_path(free_map, start_cm, goal_cm, planner(algorithm, neighbours, moves="proved"))
+    if result.status is SearchStatus.NO_PATH:
+        assert "No path" in result.reason
+        return
+    assert least_clearance_cm(scene, result.path.points_cm) > free_map.margin_cm
+
+
+def test_most_random_cases_have_a_path_and_the_oracle_sees_node_checked_ones_collide():
+    """The test above is not empty: with nodes checked only, some of the very same searches come too near."""
+    found = collided = 0
+    for seed in CASES:
+        scene, free_map, start_cm, goal_cm = random_case(seed)
+        found += find_path(free_map, start_cm, goal_cm, planner("chs", 56, moves="proved")).path is not None
+        hopped = find_path(free_map, start_cm, goal_cm, planner("chs", 56)).path
+        collided += hopped is not None and least_clearance_cm(scene, hopped.points_cm) <= free_map.margin_cm
+    assert found >= 5 and collided >= 5
+
+
+def test_table_1_case_2_with_chs_is_free_when_proved_and_not_when_nodes_are_checked():
+    scene = table1_scene(2)
+    free_map = build_free_map(scene)
+    clearances = {
+        moves: least_clearance_cm(
+            scene,
+            find_path(
+                free_map, scene.task.start_cm, scene.task.goal_cm, planner("chs", 56, moves=moves)
+            ).path.points_cm,
+        )
+        for moves in ("nodes", "proved")
+    }
+    assert clearances["nodes"] < free_map.margin_cm < clearances["proved"]
+
+
+@cache
+def proved_graph(seed, algorithm, neighbours):
+    """All moves of the whole neighbourhood that `prove_line` proves, as a matrix over the map's nodes."""
+    _, free_map, _, _ = random_case(seed)
+    rows, columns = free_map.region.shape
+    heads, tails, lengths = [], [], []
+    for iy, ix in np.argwhere(free_map.region == FREE):
+        for dx, dy in stencil(algorithm, neighbours).tolist():
+            x, y = ix + dx, iy + dy
+            forward = dy > 0 or (dy == 0 and dx > 0)
+            if not (forward and 0 <= x < columns and y < rows and free_map.region[y, x] == FREE):
+                continue
+            line = free_map.x_cm[ix], free_map.y_cm[iy], free_map.x_cm[x], free_map.y_cm[y]
+            if prove_line(free_map.world, *line)[0] == PROVED:
+                heads.append(iy * columns + ix)
+                tails.append(y * columns + x)
+                lengths.append(free_map.cell_cm * hypot(dx, dy))
+    return csr_matrix((lengths, (heads, tails)), shape=(rows * columns,) * 2)
+
+
+@pytest.mark.parametrize(("algorithm", "neighbours"), [("a_star", 8), ("modified_a_star", 24), ("chs", 12)])
+@pytest.mark.parametrize("seed", [7, 11, 13])
+def test_the_length_is_dijkstras_on_the_graph_of_all_proved_moves(algorithm, neighbours, seed):
+    """The search uses primitive moves only and accepts cells that are free as a whole unseen; neither shows."""
+    _, free_map, start_cm, goal_cm = random_case(seed)
+
+    def place(point_cm):
+        ix = int(np.argmin(np.abs(free_map.x_cm - point_cm[0])))
+        return int(np.argmin(np.abs(free_map.y_cm - point_cm[1]))) * len(free_map.x_cm) + ix
+
+    graph = proved_graph(seed, algorithm, neighbours)
+    expected_cm = dijkstra(graph, directed=False, indices=place(start_cm))[place(goal_cm)]
+    result = find_path(free_map, start_cm, goal_cm, planner(algorithm, neighbours, moves="proved"))
+    if expected_cm == inf:
+        assert result.status is SearchStatus.NO_PATH
+    else:
+        assert result.path.length_cm == pytest.approx(expected_cm, rel=1e-12)
+
+
+@pytest.mark.parametrize(("algorithm", "neighbours"), [("a_star", 8), ("chs", 80)])
+def test_a_move_is_as_free_one_way_as_the_other(algorithm, neighbours):
+    _, free_map, _, _ = random_case(0)
+    offsets = stencil(algorithm, neighbours).tolist()
+    lattice = make_lattice(free_map, 5)
+    rng = np.random.default_rng(1)
+    nodes = rng.permutation(np.argwhere(free_map.region == FREE))[:60]
+    verdicts = []
+    for iy, ix in nodes.tolist():
+        a = node_at(lattice, ix + lattice.column + 5, iy + lattice.row + 5)
+        for dx, dy in offsets:
+            b = a + dx + dy * lattice.width
+            verdicts.append(line_is_free(lattice, free_map.world, a, b))
+            assert verdicts[-1] == line_is_free(lattice, free_map.world, b, a)
+    assert 0.1 < np.mean(verdicts) < 1.0
+
+
+def test_a_move_through_cells_that_are_free_as_a_whole_can_always_be_proved():
+    """So accepting it unseen changes nothing."""
+    _, free_map, _, _ = random_case(2)
+    rng = np.random.default_rng(2)
+    checked = 0
+    for iy, ix in rng.permutation(np.argwhere(free_map.whole))[:150].tolist():
+        for dx, dy in stencil("chs", 56).tolist():
+            cells = [(iy + y, ix + x) for x, y in cover(dx, dy)]
+            rows, columns = free_map.whole.shape
+            if all(0 <= y < rows and 0 <= x < columns and free_map.whole[y, x] for y, x in cells):
+                line = free_map.x_cm[ix], free_map.y_cm[iy], free_map.x_cm[ix + dx], free_map.y_cm[iy + dy]
+                assert prove_line(free_map.world, *line)[0] == PROVED
+                checked += 1
+    assert checked > 1000
+
+
+@pytest.mark.parametrize(("algorithm", "neighbours"), EXACT)
+def test_proving_moves_never_shortens_a_path(algorithm, neighbours):
+    _, free_map, start_cm, goal_cm = random_case(4)
+    nodes, proved = (
+        find_path(free_map, start_cm, goal_cm, planner(algorithm, neighbours, moves=moves))
+        for moves in ("nodes", "proved")
+    )
+    if proved.path:
+        assert nodes.path.length_cm <= proved.path.length_cm * (1.0 + 1e-12)
