@@ -1,8 +1,8 @@
 """Round a path's corners by parabolas that are proved free.
 
 A corner between two legs is cut by the quadratic Bezier curve that leaves the legs at equal distances d from it;
-its control point is the corner. With unit vectors u and v along the legs it comes within d |v - u| / 4 of the corner, so
-a tolerance for that distance gives the largest d. Each leg is shared by the corners at its two ends, half to each.
+its control point is the corner. With unit vectors u and v along the legs it comes within d |v - u| / 4 of the corner,
+so a tolerance for that distance gives the largest d. Each leg is shared by the corners at its two ends, half to each.
 A curve that cannot be proved free is tried with half of d, and so on; a corner left sharp is a stop.
 """
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 __all__ = ["SmoothPath", "blend_corners"]
 
-DEFAULT_TOLERANCE_CM = 1.0
+DEFAULT_TOLERANCE_CM = 0.5
 """The tip leaves a corner by at most this, unless told otherwise."""
 
 SMALLEST_LEG_CM = 0.01

@@ -10,8 +10,10 @@ planned angle, for as long as the pair would have lasted. A first step before th
 """
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 from planarm_wire.messages import MIN_DIR_SETUP_TICKS, TICKS_HZ
 
 from planarm.errors import TimingError
@@ -37,8 +39,8 @@ TIMING_USTEPS = 0.025
 SUBDIVISION = 4
 """Parts of each interval of the trajectory in which the angles are searched for turning points."""
 
-ROOT_USTEPS = 1e-10
-"""A crossing is found when the angle is this near to it, well above rounding at 10^5 micro-steps."""
+ROOT_RAD = 1e-13
+"""A crossing is found when the angle is this near to it: 1e-8 micro-steps at 10^5 micro-steps a radian."""
 
 MAX_ITERATIONS = 100
 
@@ -120,45 +122,53 @@ def _turning_points(trajectory: Trajectory, j: int, low: Floats, high: Floats, r
 
 def _joint_steps(trajectory: Trajectory, j: int, s: Floats, usteps_per_rad: float) -> JointSteps:
     """Return the steps of joint j, whose angle is monotone between neighbours of s."""
-    nearest = to_usteps(trajectory.path.evaluate(s).q_rad[:, j], usteps_per_rad)
+    q_rad = trajectory.path.evaluate(s).q_rad[:, j]
+    nearest = to_usteps(q_rad, usteps_per_rad)
     crossed = np.diff(nearest)
     piece = np.repeat(np.arange(len(crossed)), np.abs(crossed))
     direction = np.sign(crossed)[piece]
     first = np.cumsum(np.abs(crossed)) - np.abs(crossed)
     order = np.arange(len(piece)) - first[piece]
-    middles = nearest[piece] + direction * (order + 0.5)
-    crossings = _crossings(
-        trajectory, j, middles / usteps_per_rad, s[piece], s[piece + 1], ROOT_USTEPS / usteps_per_rad
-    )
+    middles_rad = (nearest[piece] + direction * (order + 0.5)) / usteps_per_rad
+    bracket = _Bracket(s[piece], s[piece + 1], direction > 0)
+    share = (middles_rad - q_rad[piece]) / (q_rad[piece + 1] - q_rad[piece])
+    guess = bracket.low + np.clip(share, 0.0, 1.0) * (bracket.high - bracket.low)
+    crossings = _crossings(trajectory, j, middles_rad, bracket, guess)
     ticks = np.floor(trajectory.time_at(crossings) * TICKS_HZ + 0.5).astype(np.int64)
     ticks = np.maximum.accumulate(np.maximum(ticks, MIN_DIR_SETUP_TICKS))
     return JointSteps(*_without_flutter(ticks, direction.astype(np.int8)))
 
 
-def _crossings(
-    trajectory: Trajectory, j: int, q_rad: Floats, low: Floats, high: Floats, tolerance_rad: float
-) -> Floats:
-    """Return where joint j passes each angle between `low` and `high`: Newton's method, kept inside by bisection."""
-    low, high = low.copy(), high.copy()
-    rising = trajectory.path.evaluate(high, "left").q_rad[:, j] >= q_rad
-    s = 0.5 * (low + high)
-    open_ = np.arange(len(s))
+@dataclass(frozen=True, slots=True)
+class _Bracket:
+    """Where crossings are looked for, shape (n,) each, and whether the angle rises there."""
+
+    low: Floats
+    high: Floats
+    rises: NDArray[np.bool_]
+
+
+def _crossings(trajectory: Trajectory, j: int, q_rad: Floats, bracket: _Bracket, guess: Floats) -> Floats:
+    """Return where joint j passes each angle: Newton's method from a guess, kept in the bracket by bisection."""
+    s, low, high = guess.copy(), bracket.low.copy(), bracket.high.copy()
+    left = np.arange(len(s))
     for _ in range(MAX_ITERATIONS):
-        if not len(open_):
+        if not len(left):
             return s
-        state = trajectory.path.evaluate(s[open_])
-        error = state.q_rad[:, j] - q_rad[open_]
-        before = (error < 0.0) == rising[open_]
-        low[open_] = np.where(before, s[open_], low[open_])
-        high[open_] = np.where(before, high[open_], s[open_])
-        rate = state.dq_rad[:, j]
-        newton = s[open_] - np.divide(error, rate, out=np.full(len(error), np.inf), where=rate != 0.0)
-        inside = (newton > low[open_]) & (newton < high[open_])
-        following = np.where(inside, newton, 0.5 * (low[open_] + high[open_]))
-        done = (np.abs(error) <= tolerance_rad) | (following == s[open_])
-        s[open_[~done]] = following[~done]
-        open_ = open_[~done]
-    raise TimingError(f"the steps of joint {j + 1} at {trajectory.path.place(float(s[open_[0]]))} could not be located")
+        at = s[left]
+        state = trajectory.path.evaluate(at)
+        error, rate = state.q_rad[:, j] - q_rad[left], state.dq_rad[:, j]
+        before = (error < 0.0) == bracket.rises[left]
+        low[left] = np.where(before, at, low[left])
+        high[left] = np.where(before, high[left], at)
+        newton = at - np.divide(error, rate, out=np.full(len(at), np.inf), where=rate != 0.0)
+        inside = (newton > low[left]) & (newton < high[left])
+        following = np.where(inside, newton, 0.5 * (low[left] + high[left]))
+        between = (following > low[left]) & (following < high[left])  # else the bracket is down to rounding
+        more = (np.abs(error) > ROOT_RAD) & between
+        s[left[more]] = following[more]
+        left = left[more]
+    raise TimingError(f"the steps of joint {j + 1} at {trajectory.path.place(float(s[left[0]]))} could not be located")
 
 
 def _without_flutter(ticks: Ticks, directions: Directions) -> tuple[Ticks, Directions]:

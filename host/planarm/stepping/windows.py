@@ -30,8 +30,8 @@ class Windows(NamedTuple):
 
 
 LOW, HIGH, GAP, SETUP, RUN_END = 0, 1, 2, 3, 4
-"""Columns of a step: earliest and latest tick; least ticks since the joint's step before; least ticks since its segment's
-start, above 0 where DIR may change; index after the last step that may share a run with this one."""
+"""Columns of a step: earliest and latest tick; least ticks since the joint's step before; least ticks since the start
+of the step's segment, above 0 where DIR may change; index after the last step that may share a run with this one."""
 
 
 def tolerance_ticks(steps: JointSteps) -> Ticks:

@@ -30,7 +30,10 @@ FIRST_STEP_RAD = 0.02
 MIN_INTERVALS = 8
 MAX_INTERVALS = 1 << 14
 SPLIT_ABOVE = 1.0 + 1e-3
+SLOW_BELOW = 1.0 + 1e-5
 ROUNDS = 16
+"""An interval that exceeds a limit beyond SPLIT_ABOVE is split, else tightened; from SLOW_BELOW on, or after ROUNDS,
+the whole motion is run slower by the rest."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,11 +73,12 @@ def time_path(path: JointPath, joints: Sequence[JointSpec], share: float = STOPP
     trajectory = _solve(path, grid, limits)
     for _ in range(ROUNDS):
         use = limit_use(trajectory, limits.speeds_rad_s, limits.accelerations_rad_s2)
-        if max(use.speed.max(), use.acceleration.max()) <= 1.0:
-            return trajectory
+        if max(use.speed.max(), use.acceleration.max()) <= SLOW_BELOW:
+            break
         grid = _refine(grid, use)
         trajectory = _solve(path, grid, limits)
-    use = limit_use(trajectory, limits.speeds_rad_s, limits.accelerations_rad_s2)
+    else:
+        use = limit_use(trajectory, limits.speeds_rad_s, limits.accelerations_rad_s2)
     return _slowed(trajectory, max(1.0, float(use.speed.max()), float(np.sqrt(use.acceleration.max()))))
 
 
@@ -83,12 +87,12 @@ def _limits_of(joints: Sequence[JointSpec], share: float) -> _Limits:
     if not 0.0 < share <= 1.0:
         raise TimingError(f"the share of the acceleration is {share}; it must be above 0 and at most 1")
     for number, joint in enumerate(joints, start=1):
-        for key in ("max_speed_rad_s", "max_acceleration_rad_s2"):
-            value = getattr(joint, key)
+        for key, value in (
+            ("max_speed_deg_s", np.degrees(joint.max_speed_rad_s)),
+            ("max_acceleration_deg_s2", np.degrees(joint.max_acceleration_rad_s2)),
+        ):
             if not (np.isfinite(value) and value > 0.0):
-                raise TimingError(
-                    f"joint {number} cannot be timed: {key} is {value}; set joints[{number}].{key} above 0"
-                )
+                raise TimingError(f"joint {number} cannot be timed: joints[{number}].{key} is {value}; set it above 0")
     return _Limits(
         HEADROOM * np.array([joint.max_speed_rad_s for joint in joints]),
         HEADROOM * share * np.array([joint.max_acceleration_rad_s2 for joint in joints]),
