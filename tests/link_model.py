@@ -366,7 +366,7 @@ def _segment(chance: random.Random, ticks: int) -> Segment:
     moves = []
     for _ in range(2):
         steps = chance.randrange(0, 12)
-        interval = ticks // 13
+        interval = min(ticks // 13, 50_000)
         moves.append(
             Move(
                 steps_dir=2 * steps + chance.randrange(2),

@@ -17,7 +17,8 @@ The time-out follows the measured round trip as in RFC 6298 (Karn's rule include
 a full window takes 4.5 ms to send and a reply 1.3 ms; the Uno's USB bridge holds replies for up to 4.1 ms (its timer 0
 overflows every 65,536 cycles of 16 MHz) and USB adds about 1 ms each way. 20 ms lies above that sum of 12 ms with room
 for the computer's scheduler. 250 ms keeps a line alive whose USB chip holds bytes for 16 ms and more, and still asks
-several times before the link is given up.
+several times before the link is given up. Time-outs in a row grow by half, not by the RFC's factor of two: nobody else
+uses this line, so there is no congestion to yield to, and a motion waits for the bytes.
 
 No I/O: methods take the time and return the bytes to write.
 """
@@ -31,6 +32,7 @@ from planarm_wire.messages import DELIMITER, HOST_WINDOW_BYTES
 INITIAL_TIMEOUT_S = 0.050
 MIN_TIMEOUT_S = 0.020
 MAX_TIMEOUT_S = 0.250
+BACK_OFF = 1.5
 
 _SEQUENCE = 256
 _LEAD = bytes([DELIMITER])  # ends whatever noise the device has gathered since the last frame
@@ -77,7 +79,7 @@ class GoBackN:
         self._smoothed_s: float | None = None
         self._deviation_s = 0.0
         self._timeout_s = INITIAL_TIMEOUT_S
-        self._patience = 1  # doubles with every time-out in a row
+        self._patience = 1.0  # grows with every time-out in a row
         self._timer_s = 0.0
         self._deaf_until_s = float("-inf")
 
@@ -140,7 +142,7 @@ class GoBackN:
         """Return the bytes to write again when the time-out has passed, else nothing."""
         if now_s < self.deadline_s:
             return b""
-        self._patience *= 2
+        self._patience *= BACK_OFF
         self.counters.timeouts += 1
         return self._go_back(now_s)
 
@@ -170,8 +172,8 @@ class GoBackN:
         return copies
 
     def _measure(self, round_trip_s: float) -> None:
-        """RFC 6298, section 2; only such a measurement ends the doubling of the time-out (section 5)."""
-        self._patience = 1
+        """RFC 6298, section 2; only such a measurement ends the growth of the time-out (section 5)."""
+        self._patience = 1.0
         if self._smoothed_s is None:
             self._smoothed_s, self._deviation_s = round_trip_s, round_trip_s / 2
         else:

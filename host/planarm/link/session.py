@@ -85,7 +85,7 @@ class Session:
         self._decoder = FrameDecoder()
         self._output = bytearray()
         self._names: dict[int, str] = {}
-        self._opened_s = now_s
+        self._hello_limit_s = now_s + self.limits.hello_s
         self._hellos = 0
         self._hello_due_s = now_s
         self._waiting_since_s = now_s
@@ -117,10 +117,10 @@ class Session:
     def deadline_s(self) -> float:
         """When `on_time` must be called at the latest; infinity when nothing is waited for."""
         if not self.is_open:
-            return min(self._hello_due_s, self._opened_s + self.limits.hello_s)
+            return min(self._hello_due_s, self._hello_limit_s)
         if self._arq.idle:
             return float("inf")
-        return min(self._arq.deadline_s, self._waiting_since_s + self.limits.silence_s)
+        return min(self._arq.deadline_s, self._silence_limit_s)
 
     def encoded_bytes(self, message: HostMessage) -> int:
         """Length of `message` on the line if it were the next one sent."""
@@ -129,6 +129,10 @@ class Session:
     def fits(self, message: HostMessage) -> bool:
         """Whether `message` may be sent now without exceeding the window."""
         return self._arq.fits(self._encode(message))
+
+    @property
+    def _silence_limit_s(self) -> float:
+        return self._waiting_since_s + self.limits.silence_s
 
     # -- what the owner does ------------------------------------------------------------------------------------------
 
@@ -169,13 +173,13 @@ class Session:
             self._say_hello(now_s)
             return
         self._output += self._arq.on_time(now_s)
-        if not self._arq.idle and now_s - self._waiting_since_s >= self.limits.silence_s:
+        if not self._arq.idle and now_s >= self._silence_limit_s:
             raise LinkError(self._stall_words(now_s))
 
     # -- opening ------------------------------------------------------------------------------------------------------
 
     def _say_hello(self, now_s: float) -> None:
-        if now_s - self._opened_s >= self.limits.hello_s:
+        if now_s >= self._hello_limit_s:
             raise LinkError(
                 f"no answer to HELLO within {self.limits.hello_s:g} s ({self._hellos} tries); check that the port is"
                 f" the right one, that the board has power, and that the firmware is on it: {_FLASH_IT}"
@@ -267,7 +271,7 @@ class Session:
 
     def _stall_words(self, now_s: float) -> str:
         waited_s = now_s - self._waiting_since_s
-        if now_s - self._heard_s >= self.limits.silence_s:
+        if self._heard_s <= self._waiting_since_s:
             return (
                 f"no reply for {waited_s:.2f} s; check the cable, the board's power and that the port is the right one"
             )
