@@ -1,7 +1,8 @@
 """The data space as the CPU reads and writes it: registers, I/O, extended I/O, SRAM.
 
 An access happens in the last clock cycle of its instruction. A read sees the state at the start of that cycle,
-a write takes effect at its end; what is due until then happens first. CYCLE holds the end of the instruction.
+a write takes effect at its end; the caller has let happen what is due until then. CYCLE holds the end of the
+instruction.
 """
 
 from __future__ import annotations
@@ -9,7 +10,6 @@ from __future__ import annotations
 import numpy as np
 from planarm_wire.kernel_cache import kernel
 
-from planarm_sim.cpu.events import process_events
 from planarm_sim.cpu.layout import (
     CYCLE,
     HORIZON,
@@ -140,15 +140,12 @@ def read_io(st: State, eeprom: Bytes, address: int) -> int:
             return int(st[SREG_BITS])
         return int(st[SP] & 0xFF if address == SPL else st[SP] >> 8)
     cycle = st[CYCLE] - 1
-    process_events(st, eeprom, cycle)
     if PINB <= address <= PIND:
         return read_pins(st, (address - PINB) // 3, cycle)
     if TCCR1A <= address <= OCR1BH:
         return read_timer1(st, address, cycle)
-    if TCCR0A <= address <= OCR0B:
-        return read_timer8(st, TIMER0, address, cycle)
-    if TCCR2A <= address <= OCR2B:
-        return read_timer8(st, TIMER2, address, cycle)
+    if TCCR0A <= address <= OCR0B or TCCR2A <= address <= OCR2B:
+        return read_timer8(st, TIMER0 if address <= OCR0B else TIMER2, address, cycle)
     if TIFR0 <= address <= TIFR2:
         return read_timer_flags(st, address, cycle)
     if address == UDR0:
@@ -168,7 +165,6 @@ def write_io(st: State, eeprom: Bytes, address: int, value: int) -> None:
     if SPL <= address <= SREG:
         write_cpu_register(st, address, value)
         return
-    process_events(st, eeprom, cycle)
     if PINB <= address <= PORTD:
         write_port(st, address, value, cycle)
     elif TCCR1A <= address <= OCR1BH:
@@ -176,10 +172,8 @@ def write_io(st: State, eeprom: Bytes, address: int, value: int) -> None:
     elif address == UDR0:
         write_data(st, value, cycle)
         st[HORIZON] = 0
-    elif TCCR0A <= address <= OCR0B:
-        write_timer8(st, TIMER0, address, value, cycle)
-    elif TCCR2A <= address <= OCR2B:
-        write_timer8(st, TIMER2, address, value, cycle)
+    elif TCCR0A <= address <= OCR0B or TCCR2A <= address <= OCR2B:
+        write_timer8(st, TIMER0 if address <= OCR0B else TIMER2, address, value, cycle)
     elif address in (GPIOR0, GPIOR1, GPIOR2):
         st[address] = value
     else:

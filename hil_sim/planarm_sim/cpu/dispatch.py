@@ -10,50 +10,38 @@ from __future__ import annotations
 
 from planarm_wire.kernel_cache import kernel
 
+from planarm_sim.cpu import access as io
 from planarm_sim.cpu import opcodes as op
+from planarm_sim.cpu.access import access_data, note_access, take_interrupt
+from planarm_sim.cpu.events import process_events
 from planarm_sim.cpu.flags import (
     KEEP_IT,
     KEEP_ITH,
     KEEP_ITHC,
     C,
+    H,
     I,
+    N,
+    S,
     T,
+    V,
     Z,
     add_flags,
     shift_flags,
     sign_flags,
     subtract_flags,
 )
-from planarm_sim.cpu.layout import CYCLE, HORIZON, IRQ_EARLIEST, PC, SP, SREG_BITS, Bytes, State
+from planarm_sim.cpu.layout import ACCESS, ACCESS_PC, CYCLE, HORIZON, IRQ_EARLIEST, PC, SP, SREG_BITS, Bytes, State
 from planarm_sim.cpu.registers import SRAM_END, SRAM_START
-from planarm_sim.cpu.service import (
-    ACCESS_CALL,
-    ACCESS_CLEAR_BIT,
-    ACCESS_NONE,
-    ACCESS_READ,
-    ACCESS_RESTART_WATCHDOG,
-    ACCESS_RETURN,
-    ACCESS_SET_BIT,
-    ACCESS_SKIP_CLEAR,
-    ACCESS_SKIP_SET,
-    ACCESS_SLEEP,
-    ACCESS_WRITE,
-    AT_BAD_OPCODE,
-    AT_BREAK,
-    FLASH_WRITE,
-    RUNNING,
-    access_data,
-    service,
-)
+from planarm_sim.cpu.service import AT_BAD_OPCODE, AT_BREAK, FIRST_STOP, FLASH_WRITE, RUNNING, service
 
 PC_MASK = 0x3FFF
 FLASH_MASK = 0x7FFF
 Z_LOW, Z_HIGH = 30, 31
 LOWEST_PUSH = SRAM_START + 1
 """A return address that is pushed with SP from here to the end of the SRAM lies in it entirely."""
-SRAM_SIZE = SRAM_END - SRAM_START
-KEEP_H_FLAGS = KEEP_IT | (1 << 5) | (0b11100)
-"""All but C and Z, which products decide."""
+KEEP_PRODUCT = I | T | H | S | V | N
+"""What a product leaves alone."""
 
 
 @kernel
@@ -64,25 +52,25 @@ def run(st: State, sram: Bytes, eeprom: Bytes, code: State, flash: Bytes, target
     sreg = int(st[SREG_BITS])
     sp = int(st[SP])
     horizon = cycle
-    access = ACCESS_NONE
-    address = 0
-    value = 0
-    here = 0  # word address of the instruction that accesses I/O
     while True:
         if cycle >= horizon:
             st[CYCLE] = cycle
             st[SREG_BITS] = sreg
             st[SP] = sp
-            if access != ACCESS_NONE:
-                st[PC] = here
-                pc = access_data(st, sram, eeprom, access, address, value, pc)
-                access = ACCESS_NONE
+            access = st[ACCESS]
+            if access != io.NOTHING:
+                process_events(st, eeprom, cycle - 1 if access <= io.LAST_READ else cycle)
+                st[PC] = st[ACCESS_PC]
+                pc = access_data(st, sram, eeprom, pc)
             st[PC] = pc
             if st[CYCLE] >= st[HORIZON]:
-                cause = service(st, sram, eeprom, target)
+                cause = service(st, eeprom, target)
+                while RUNNING < cause < FIRST_STOP:
+                    take_interrupt(st, sram, eeprom, cause)
+                    cause = service(st, eeprom, target)
                 if cause != RUNNING:
-                    return int(cause)
-            pc = int(st[PC])
+                    return cause
+                pc = int(st[PC])
             cycle = int(st[CYCLE])
             sreg = int(st[SREG_BITS])
             sp = int(st[SP])
@@ -230,7 +218,7 @@ def run(st: State, sram: Bytes, eeprom: Bytes, code: State, flash: Bytes, target
             product = st[d] * st[r]
             st[0] = product & 0xFF
             st[1] = product >> 8
-            sreg = (sreg & KEEP_H_FLAGS) | (product >> 15) | (Z if product == 0 else 0)
+            sreg = (sreg & KEEP_PRODUCT) | (product >> 15) | (Z if product == 0 else 0)
             pc += 1
             cycle += 2
         elif operation == op.MULX:
@@ -246,7 +234,7 @@ def run(st: State, sram: Bytes, eeprom: Bytes, code: State, flash: Bytes, target
                 product = (product << 1) & 0xFFFF
             st[0] = product & 0xFF
             st[1] = product >> 8
-            sreg = (sreg & KEEP_H_FLAGS) | carry | (Z if product == 0 else 0)
+            sreg = (sreg & KEEP_PRODUCT) | carry | (Z if product == 0 else 0)
             pc += 1
             cycle += 2
 
@@ -265,9 +253,7 @@ def run(st: State, sram: Bytes, eeprom: Bytes, code: State, flash: Bytes, target
             if SRAM_START <= address < SRAM_END:
                 st[d] = sram[address - SRAM_START]
             else:
-                access = ACCESS_READ
-                value = d
-                here = pc
+                note_access(st, io.READ, address, d, pc)
                 horizon = 0
             pc += 1
             cycle += 2
@@ -277,8 +263,7 @@ def run(st: State, sram: Bytes, eeprom: Bytes, code: State, flash: Bytes, target
             if SRAM_START <= address < SRAM_END:
                 sram[address - SRAM_START] = value
             else:
-                access = ACCESS_WRITE
-                here = pc
+                note_access(st, io.WRITE, address, value, pc)
                 horizon = 0
             pc += 1
             cycle += 2
@@ -289,9 +274,7 @@ def run(st: State, sram: Bytes, eeprom: Bytes, code: State, flash: Bytes, target
             if SRAM_START <= address < SRAM_END:
                 st[d] = sram[address - SRAM_START]
             else:
-                access = ACCESS_READ
-                value = d
-                here = pc
+                note_access(st, io.READ, address, d, pc)
                 horizon = 0
             pc += 1
             cycle += 2
@@ -302,9 +285,7 @@ def run(st: State, sram: Bytes, eeprom: Bytes, code: State, flash: Bytes, target
             if SRAM_START <= address < SRAM_END:
                 st[d] = sram[address - SRAM_START]
             else:
-                access = ACCESS_READ
-                value = d
-                here = pc
+                note_access(st, io.READ, address, d, pc)
                 horizon = 0
             pc += 1
             cycle += 2
@@ -316,8 +297,7 @@ def run(st: State, sram: Bytes, eeprom: Bytes, code: State, flash: Bytes, target
             if SRAM_START <= address < SRAM_END:
                 sram[address - SRAM_START] = value
             else:
-                access = ACCESS_WRITE
-                here = pc
+                note_access(st, io.WRITE, address, value, pc)
                 horizon = 0
             pc += 1
             cycle += 2
@@ -329,8 +309,7 @@ def run(st: State, sram: Bytes, eeprom: Bytes, code: State, flash: Bytes, target
             if SRAM_START <= address < SRAM_END:
                 sram[address - SRAM_START] = value
             else:
-                access = ACCESS_WRITE
-                here = pc
+                note_access(st, io.WRITE, address, value, pc)
                 horizon = 0
             pc += 1
             cycle += 2
@@ -339,9 +318,7 @@ def run(st: State, sram: Bytes, eeprom: Bytes, code: State, flash: Bytes, target
             if SRAM_START <= address < SRAM_END:
                 st[d] = sram[address - SRAM_START]
             else:
-                access = ACCESS_READ
-                value = d
-                here = pc
+                note_access(st, io.READ, address, d, pc)
                 horizon = 0
             pc += 2
             cycle += 2
@@ -351,8 +328,7 @@ def run(st: State, sram: Bytes, eeprom: Bytes, code: State, flash: Bytes, target
             if SRAM_START <= address < SRAM_END:
                 sram[address - SRAM_START] = value
             else:
-                access = ACCESS_WRITE
-                here = pc
+                note_access(st, io.WRITE, address, value, pc)
                 horizon = 0
             pc += 2
             cycle += 2
@@ -372,10 +348,7 @@ def run(st: State, sram: Bytes, eeprom: Bytes, code: State, flash: Bytes, target
             if SRAM_START <= sp < SRAM_END:
                 st[d] = sram[sp - SRAM_START]
             else:
-                access = ACCESS_READ
-                address = sp
-                value = d
-                here = pc
+                note_access(st, io.READ, sp, d, pc)
                 horizon = 0
             pc += 1
             cycle += 2
@@ -386,26 +359,19 @@ def run(st: State, sram: Bytes, eeprom: Bytes, code: State, flash: Bytes, target
             if SRAM_START <= address < SRAM_END:
                 sram[address - SRAM_START] = value
             else:
-                access = ACCESS_WRITE
-                here = pc
+                note_access(st, io.WRITE, address, value, pc)
                 horizon = 0
             pc += 1
             cycle += 2
 
         # --- I/O ------------------------------------------------------------------------------------------
         elif operation == op.IN:
-            access = ACCESS_READ
-            address = r
-            value = d
-            here = pc
+            note_access(st, io.READ, r, d, pc)
             horizon = 0
             pc += 1
             cycle += 1
         elif operation == op.OUT:
-            access = ACCESS_WRITE
-            address = d
-            value = st[r]
-            here = pc
+            note_access(st, io.WRITE, d, st[r], pc)
             horizon = 0
             pc += 1
             cycle += 1
@@ -423,34 +389,22 @@ def run(st: State, sram: Bytes, eeprom: Bytes, code: State, flash: Bytes, target
                 st[HORIZON] = horizon
             sreg = value
         elif operation == op.CBI:
-            access = ACCESS_CLEAR_BIT
-            address = d
-            value = r
-            here = pc
+            note_access(st, io.CLEAR_BIT, d, r, pc)
             horizon = 0
             pc += 1
             cycle += 2
         elif operation == op.SBI:
-            access = ACCESS_SET_BIT
-            address = d
-            value = r
-            here = pc
+            note_access(st, io.SET_BIT, d, r, pc)
             horizon = 0
             pc += 1
             cycle += 2
         elif operation == op.SBIC:
-            access = ACCESS_SKIP_CLEAR
-            address = d
-            value = r | (k << 8)
-            here = pc
+            note_access(st, io.SKIP_CLEAR, d, r | (k << 8), pc)
             horizon = 0
             pc += 1
             cycle += 1
         elif operation == op.SBIS:
-            access = ACCESS_SKIP_SET
-            address = d
-            value = r | (k << 8)
-            here = pc
+            note_access(st, io.SKIP_SET, d, r | (k << 8), pc)
             horizon = 0
             pc += 1
             cycle += 1
@@ -493,9 +447,7 @@ def run(st: State, sram: Bytes, eeprom: Bytes, code: State, flash: Bytes, target
                 sram[sp - LOWEST_PUSH] = (pc + 1) >> 8
                 sp -= 2
             else:
-                access = ACCESS_CALL
-                value = pc + 1
-                here = pc
+                note_access(st, io.CALL, sp, pc + 1, pc)
                 horizon = 0
             pc = k
             cycle += 3
@@ -505,9 +457,7 @@ def run(st: State, sram: Bytes, eeprom: Bytes, code: State, flash: Bytes, target
                 sram[sp - LOWEST_PUSH] = (pc + 2) >> 8
                 sp -= 2
             else:
-                access = ACCESS_CALL
-                value = pc + 2
-                here = pc
+                note_access(st, io.CALL, sp, pc + 2, pc)
                 horizon = 0
             pc = k
             cycle += 4
@@ -517,9 +467,7 @@ def run(st: State, sram: Bytes, eeprom: Bytes, code: State, flash: Bytes, target
                 sram[sp - LOWEST_PUSH] = (pc + 1) >> 8
                 sp -= 2
             else:
-                access = ACCESS_CALL
-                value = pc + 1
-                here = pc
+                note_access(st, io.CALL, sp, pc + 1, pc)
                 horizon = 0
             pc = (st[Z_LOW] | (st[Z_HIGH] << 8)) & PC_MASK
             cycle += 3
@@ -528,8 +476,7 @@ def run(st: State, sram: Bytes, eeprom: Bytes, code: State, flash: Bytes, target
                 pc = ((int(sram[sp + 1 - SRAM_START]) << 8) | int(sram[sp + 2 - SRAM_START])) & PC_MASK
                 sp += 2
             else:
-                access = ACCESS_RETURN
-                here = pc
+                note_access(st, io.RETURN, pc, pc, pc)
                 horizon = 0
             cycle += 4
         elif operation == op.RETI:
@@ -537,8 +484,7 @@ def run(st: State, sram: Bytes, eeprom: Bytes, code: State, flash: Bytes, target
                 pc = ((int(sram[sp + 1 - SRAM_START]) << 8) | int(sram[sp + 2 - SRAM_START])) & PC_MASK
                 sp += 2
             else:
-                access = ACCESS_RETURN
-                here = pc
+                note_access(st, io.RETURN, pc, pc, pc)
                 horizon = 0
             sreg |= I
             cycle += 4
@@ -585,14 +531,12 @@ def run(st: State, sram: Bytes, eeprom: Bytes, code: State, flash: Bytes, target
         elif operation == op.WRAP:
             pc &= PC_MASK
         elif operation == op.SLEEP:
-            access = ACCESS_SLEEP
-            here = pc
+            note_access(st, io.SLEEP, pc, pc, pc)
             horizon = 0
             pc += 1
             cycle += 1
         elif operation == op.WDR:
-            access = ACCESS_RESTART_WATCHDOG
-            here = pc
+            note_access(st, io.RESTART_WATCHDOG, pc, pc, pc)
             horizon = 0
             pc += 1
             cycle += 1

@@ -31,6 +31,10 @@ NEVER = 1 << 62
     ASLEEP,  # 0 awake, else 1 + sleep mode (SM2:0)
     RESET_REQUEST,  # bits of MCUSR of a reset that a peripheral asks for
     BOOT_START,  # word address of the boot section, where vectors go when IVSEL is set
+    ACCESS,  # what the instruction that just ended wants from I/O, and the particulars (see `access`)
+    ACCESS_ADDRESS,
+    ACCESS_VALUE,
+    ACCESS_PC,
     IVCE_UNTIL,  # last cycle at which IVSEL may be changed
     OUTSIDE_ADDRESS,  # first data address beyond the chip's memory that was used, plus 1
     OUTSIDE_PC,
@@ -80,7 +84,7 @@ NEVER = 1 << 62
     IN_HEAD,
     IN_TAIL,
     _CPU_END,
-) = range(256, 256 + 53)
+) = range(256, 256 + 57)
 
 # --- When each source of events is due ----------------------------------------------------------------------
 (DUE_TIMER0, DUE_TIMER1, DUE_TIMER2, DUE_TX, DUE_RX, DUE_PIPE, DUE_INPUT, DUE_CAPTURE, DUE_EEPROM, DUE_WATCHDOG) = (
@@ -142,11 +146,12 @@ SLOPE_COUNT, SLOPE_FAST, SLOPE_DUAL = 0, 1, 2
 TOP_FIXED, TOP_OCR_A, TOP_ICR = 0, 1, 2
 AT_ONCE, AT_TOP, AT_BOTTOM, AT_MAX = 0, 1, 2, 3
 
-TIMER0 = PIPE + 2 * PIPE_SLOTS
+# NumPy integers: Numba compiles a function once more for every Python constant that is passed to it.
+TIMER0 = np.int64(PIPE + 2 * PIPE_SLOTS)
 TIMER1 = TIMER0 + _F_END
 TIMER2 = TIMER1 + _F_END
 
-TOUCHED = TIMER2 + _F_END
+TOUCHED = int(TIMER2) + _F_END
 """256 words, one per data address: 1 + PC of the first access when its part is not modelled, else 0."""
 STATE_WORDS = TOUCHED + 256
 """What a snapshot has to copy of the state array; the queues are behind it."""

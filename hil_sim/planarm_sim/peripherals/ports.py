@@ -7,6 +7,7 @@ seen by an IN only with one instruction between them).
 
 from __future__ import annotations
 
+import numpy as np
 from planarm_wire.kernel_cache import kernel
 
 from planarm_sim.cpu.layout import (
@@ -50,9 +51,9 @@ EFFECT_CLOCK0, EFFECT_CLOCK1, EFFECT_CAPTURE, EFFECT_LEVEL = 32, 64, 128, 256
 PUD = 1 << 4  # MCUCR: pull-ups off everywhere
 ICNC1, ICES1 = 1 << 7, 1 << 6  # TCCR1B
 CAPTURE_FILTER_CYCLES = 4  # the noise canceller wants four equal samples (datasheet, 16.6.2)
-PORT_B, PORT_D = 0, 2
+PORT_B, PORT_D = np.int64(0), np.int64(2)  # NumPy integers: see `layout`
 CAPTURE_PIN, CLOCK0_PIN, CLOCK1_PIN = 1 << 0, 1 << 4, 1 << 5  # PB0, PD4, PD5
-INT0_PIN, INT1_PIN = 1 << 2, 1 << 3  # PD2, PD3
+INT0_PIN = 1 << 2  # PD2; INT1 is PD3
 
 
 @kernel
@@ -102,10 +103,10 @@ def notify_inputs(st: State, port: int, changed: int, level: int, cycle: int) ->
         effects = EFFECT_PCI0 << port
     if port == PORT_D:
         sense = st[EICRA]
-        if changed & INT0_PIN:
-            effects |= edge_effect(sense & 3, level & INT0_PIN, EFFECT_INT0)
-        if changed & INT1_PIN:
-            effects |= edge_effect((sense >> 2) & 3, level & INT1_PIN, EFFECT_INT1)
+        for number in range(2):
+            pin = INT0_PIN << number
+            if changed & pin:
+                effects |= edge_effect((sense >> (2 * number)) & 3, level & pin, EFFECT_INT0 << number)
         if changed & CLOCK0_PIN and clocks(st[TIMER0 + F_SHIFT], level & CLOCK0_PIN):
             effects |= EFFECT_CLOCK0
         if changed & CLOCK1_PIN and clocks(st[TIMER1 + F_SHIFT], level & CLOCK1_PIN):
@@ -172,7 +173,7 @@ def write_port(st: State, address: int, value: int, cycle: int) -> None:
 
 
 @kernel
-def set_override(st: State, pin: int, connected: int, level: int, cycle: int) -> None:
+def set_override(st: State, pin: int, connected: bool, level: bool, cycle: int) -> None:
     """Connect a peripheral's output to a pin in place of PORTx, or disconnect it."""
     port = pin >> 3
     mask = 1 << (pin & 7)

@@ -218,10 +218,8 @@ def write_timer1(st: State, address: int, value: int, cycle: int) -> None:
         force_compare(st, TIMER1, value, cycle)
     elif address == TCNT1L:
         write_count(st, TIMER1, word)
-    elif address == OCR1AL:
-        write_compare(st, TIMER1, 0, word)
-    elif address == OCR1BL:
-        write_compare(st, TIMER1, 1, word)
+    elif address in (OCR1AL, OCR1BL):
+        write_compare(st, TIMER1, (address - OCR1AL) >> 1, word)
     elif address == ICR1L and st[TIMER1 + F_TOP_SOURCE] == TOP_ICR:
         st[TIMER1 + F_ICR] = word  # in the other modes the register belongs to input capture (16.6.3)
     plan_timer(st, TIMER1)
@@ -282,24 +280,19 @@ def write_timer_mask(st: State, address: int, value: int, cycle: int) -> None:
 
 
 @kernel
-def reset_prescaler(st: State, prescaler: int, held: int, hold: bool, cycle: int) -> None:
-    """Restart a prescaler at `cycle`; its timers are worked out up to here already."""
-    st[prescaler] = cycle
-    st[held] = 1 if hold else 0
-
-
-@kernel
 def write_prescaler_control(st: State, value: int, cycle: int) -> None:
     """Write GTCCR: PSRSYNC and PSRASY restart the prescalers; with TSM they stay in reset (datasheet, 17.4.1)."""
     hold = value & TSM != 0
     for t in (TIMER0, TIMER1, TIMER2):
         advance_timer(st, t, cycle)
     if value & PSRSYNC or st[HELD_01]:
-        reset_prescaler(st, PRESCALER_01, HELD_01, hold and value & PSRSYNC != 0, cycle)
+        st[PRESCALER_01] = cycle
+        st[HELD_01] = 1 if hold and value & PSRSYNC else 0
         st[TIMER0 + F_SYNC] = cycle
         st[TIMER1 + F_SYNC] = cycle
     if value & PSRASY or st[HELD_2]:
-        reset_prescaler(st, PRESCALER_2, HELD_2, hold and value & PSRASY != 0, cycle)
+        st[PRESCALER_2] = cycle
+        st[HELD_2] = 1 if hold and value & PSRASY else 0
         st[TIMER2 + F_SYNC] = cycle
     st[GTCCR] = value & (TSM | PSRSYNC | PSRASY) if hold else 0
     for t in (TIMER0, TIMER1, TIMER2):

@@ -159,10 +159,9 @@ def clock_timer(st: State, t: int, cycle: int) -> None:
     if (load_at == AT_TOP and is_top) or (load_at == AT_BOTTOM and (is_bottom or (wraps and slope == SLOPE_FAST))):
         st[t + F_OCR_A] = st[t + F_BUFFER_A]
         st[t + F_OCR_B] = st[t + F_BUFFER_A + 1]
-    if st[t + F_COM_A]:
-        drive_output(st, t, 0, matched & OCF_A, wraps, is_top, is_bottom, cycle)
-    if st[t + F_COM_B]:
-        drive_output(st, t, 1, matched & OCF_B, wraps, is_top, is_bottom, cycle)
+    for channel in range(2):
+        if st[t + F_COM_A + channel]:
+            drive_output(st, t, channel, matched & (OCF_A << channel), wraps, is_top, is_bottom, cycle)
 
 
 @kernel
@@ -222,7 +221,7 @@ def latch_output(st: State, t: int, channel: int, action: int, cycle: int) -> No
     after = 1 - before if action == COM_TOGGLE else action - COM_CLEAR
     if after != before:
         st[t + F_LATCH_A + channel] = after
-        set_override(st, st[t + F_PIN_A + channel], 1, after, cycle)
+        set_override(st, st[t + F_PIN_A + channel], True, after != 0, cycle)
 
 
 @kernel
@@ -248,9 +247,9 @@ def set_outputs(st: State, t: int, com_a: int, com_b: int, cycle: int) -> None:
     st[t + F_COM_B] = com_b
     for channel in range(2):
         pin = st[t + F_PIN_A + channel]
-        connected = 1 if st[t + F_COM_A + channel] else 0
-        if connected != (st[OVERRIDE + (pin >> 3)] >> (pin & 7)) & 1:
-            set_override(st, pin, connected, st[t + F_LATCH_A + channel], cycle)
+        connected = st[t + F_COM_A + channel] != 0
+        if connected != ((st[OVERRIDE + (pin >> 3)] >> (pin & 7)) & 1 != 0):
+            set_override(st, pin, connected, st[t + F_LATCH_A + channel] != 0, cycle)
 
 
 @kernel

@@ -12,6 +12,7 @@ shift register's place (20.7.4: DOR is set when its start bit is found, so the o
 
 from __future__ import annotations
 
+import numpy as np
 from planarm_wire.kernel_cache import kernel
 
 from planarm_sim.cpu.layout import (
@@ -53,7 +54,7 @@ from planarm_sim.peripherals.ports import PORT_D, refresh_port, set_override
 RXC, TXC, UDRE, FE, DOR, UPE, U2X, MPCM = (1 << bit for bit in range(7, -1, -1))  # UCSR0A
 RXEN, TXEN, UCSZ2, RXB8, TXB8 = 1 << 4, 1 << 3, 1 << 2, 1 << 1, 1 << 0  # UCSR0B
 RXD, TXD = 1 << 0, 1 << 1  # PD0, PD1
-TXD_PIN = 2 * 8 + 1
+TXD_PIN = np.int64(2 * 8 + 1)
 ENTRY_DATA, ENTRY_FE, ENTRY_UPE = 0x1FF, 1 << 9, 1 << 10
 USBS, UPM1, UPM0 = 1 << 3, 1 << 5, 1 << 4  # UCSR0C
 
@@ -117,7 +118,7 @@ def end_frame(st: State, cycle: int) -> None:
 def release_transmit_pin(st: State, cycle: int) -> None:
     """Give TXD back to the port."""
     st[FORCE_OUT + PORT_D] &= ~TXD
-    set_override(st, TXD_PIN, 0, 1, cycle)
+    set_override(st, TXD_PIN, False, True, cycle)
 
 
 @kernel
@@ -190,7 +191,7 @@ def receive_event(st: State, cycle: int) -> None:
         return
     period = divider_cycles(st)
     samples = samples_per_bit(st)
-    if majority(st, cycle, 0, period, samples):  # a spike: look for the next edge
+    if majority(st, cycle, samples // 2 * period, period):  # a spike: look for the next edge
         st[RX_READY] = cycle + (samples // 2 + 1) * period
         plan_receiver(st)
         return
@@ -206,9 +207,9 @@ def receive_event(st: State, cycle: int) -> None:
 
 
 @kernel
-def majority(st: State, first: int, bit: int, period: int, samples: int) -> int:
-    """Level of a bit as the majority of its samples 8, 9, 10 (with U2X 4, 5, 6); sample 1 is at `first`."""
-    middle = first + (bit * samples + samples // 2) * period
+def majority(st: State, first: int, offset: int, period: int) -> int:
+    """Level of a bit as the majority of three samples, the middle one `offset` after sample 1 of the frame."""
+    middle = first + offset
     ones = line_level(st, middle - period) + line_level(st, middle) + line_level(st, middle + period)
     return 1 if ones >= 2 else 0
 
@@ -232,7 +233,7 @@ def sampled_bits(st: State) -> int:
         return int(st[entry + 2] & ((1 << count) - 1))
     bits = 0
     for bit in range(count):
-        bits |= majority(st, first, bit, period, samples) << bit
+        bits |= majority(st, first, (bit * samples + samples // 2) * period, period) << bit
     return bits
 
 
@@ -346,6 +347,6 @@ def write_enables(st: State, value: int, cycle: int) -> None:
     if changed & TXEN:
         if value & TXEN:
             st[FORCE_OUT + PORT_D] |= TXD
-            set_override(st, TXD_PIN, 1, 1, cycle)
+            set_override(st, TXD_PIN, True, True, cycle)
         elif not st[TX_BUSY]:
             release_transmit_pin(st, cycle)
