@@ -23,6 +23,7 @@ class FakeLine:
         self.start_s = 0.0  # the clock's first moment, so that sums of times are exact
         self.acts = deque(sorted(acts, key=lambda act: act[0]))
         self.open = False
+        self.openings = 0
         self.inbox = bytearray()  # host to board
         self.received: list[tuple[float, bytes]] = []  # board to host, with the time
         self.room = room
@@ -37,10 +38,16 @@ class FakeLine:
                 self.inbox += act
             else:
                 self.open = act == "open"
+                self.openings += self.open
 
     def is_open(self) -> bool:
         self._catch_up()
         return self.open or bool(self.inbox)
+
+    def opened(self) -> bool:
+        self._catch_up()
+        openings, self.openings = self.openings, 0
+        return openings > 0
 
     def read(self, most: int) -> bytes:
         self._catch_up()

@@ -145,7 +145,7 @@ def test_pyserial_talks_to_the_program(tmp_path, speed):
         try:
             for name in (path, str(link)):  # the second opening finds the board reset
                 with serial.Serial(name, 250_000, timeout=LONG_S, write_timeout=LONG_S) as port:
-                    assert port.read(2) == b"R\x02"
+                    assert port.read(2) in (b"R\x02", b"R\x03")  # EXTRF, and PORF when opened before it was cleared
                     text = bytes(range(5, 250)) * 4
                     port.write(text)
                     assert port.read(len(text)) == bytes(byte + 1 for byte in text)

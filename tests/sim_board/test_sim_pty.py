@@ -1,6 +1,7 @@
 """The pseudo-terminal that hosts open: raw, reopenable, with a link that comes and goes with it."""
 
 import os
+import sys
 from pathlib import Path
 
 import pytest
@@ -39,15 +40,44 @@ def test_every_byte_passes_unchanged_both_ways():
         os.close(host)
 
 
+@pytest.fixture(params=["inotify", "hang-up state"])
+def any_watch(request, monkeypatch):
+    if request.param == "hang-up state":
+        monkeypatch.setattr("planarm_sim.bridge.pty_line.watch_opening", lambda _path: None)
+    elif sys.platform != "linux":
+        pytest.skip("inotify is Linux' own")
+
+
+@pytest.mark.usefixtures("any_watch")
 def test_opening_and_closing_is_seen_again_and_again():
     with PtyLine() as line:
         assert not line.is_open()
+        assert not line.opened()
         for _ in range(3):
             host = open_terminal(line.path)
             assert line.is_open()
+            assert line.opened()
+            assert not line.opened(), "told once"
             os.close(host)
             assert not line.is_open()
+            assert not line.opened()
             assert line.read(10) == b""
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="inotify is Linux' own")
+def test_closing_and_opening_between_two_looks_is_seen():
+    with PtyLine() as line:
+        os.close(open_terminal(line.path))
+        assert line.opened(), "even when it is closed again"
+        host = open_terminal(line.path)
+        assert line.opened()
+        os.close(host)
+        host = open_terminal(line.path)
+        assert line.opened()
+        second = open_terminal(line.path)
+        assert not line.opened(), "somebody has it open already"
+        os.close(host)
+        os.close(second)
 
 
 def test_the_last_bytes_of_a_host_are_there_after_it_has_closed():
@@ -86,11 +116,14 @@ def test_waiting_on_a_closed_terminal_sleeps_instead_of_spinning(monkeypatch):
         watched = []
         monkeypatch.setattr("select.select", lambda fds, *_: watched.append(list(fds)))
         line.wait(0.0, for_bytes=True)
+        master = line._fd
+        assert master not in watched[0]
         host = open_terminal(line.path)
         line.wait(0.0, for_bytes=True)
         line.wait(0.0, for_bytes=False)
         os.close(host)
-        assert [len(fds) for fds in watched] == [0, 1, 0], "a hang-up would wake select at once, for ever"
+        others = len(watched[0])  # the watch for openings, where there is one
+        assert [len(fds) - others for fds in watched] == [0, 1, 0], "a hang-up would wake select at once, for ever"
 
 
 def test_the_link_lives_as_long_as_the_terminal(tmp_path):

@@ -80,7 +80,7 @@ def test_a_pin_is_driven_and_let_go(pulses):
 
 
 def test_compare_outputs_toggle_every_800_cycles(pulses):
-    # CTC mode with OCR1A = 799 has a period of OCR1A + 1 timer clocks (ATmega328P datasheet, 15.9.2).
+    # CTC mode with OCR1A = 799 has a period of OCR1A + 1 timer clocks (ATmega328P datasheet, 16.9.2).
     pulses.run(seconds=0.01)
     one, two = pulses.edges("D9"), pulses.edges("D10")
     assert len(one) == 200 - (one["cycle"][0] > 800)
@@ -172,7 +172,7 @@ def test_pending_counts_what_is_still_on_the_line(echo):
 
 
 @settings(deadline=None, max_examples=25)
-@given(st.integers(300, 2_000_000), st.integers(1, 200), st.integers(1, 200))
+@given(st.integers(9_600, 2_000_000), st.integers(1, 60), st.integers(1, 60))
 def test_pacing_never_drifts(baud, first, second):
     uno = Uno.from_hex(DATA / "pulses.hex", baud=baud)
     uno.serial.write(bytes(first))
@@ -192,7 +192,7 @@ def test_a_wrong_baud_rate_is_garbage_not_silence(echo):
 
 
 def test_baud_rates_within_tolerance_are_understood():
-    # 2 % apart is inside what a receiver with 8N1 takes (ATmega328P datasheet, table 19-3).
+    # 2 % apart is inside what a receiver with 8N1 takes (ATmega328P datasheet, table 20-3).
     uno = Uno.from_hex(DATA / "echo.hex", baud=245_000)
     uno.run_until(GREETING, limit_s=0.001)
     uno.serial.write(b"Hello")

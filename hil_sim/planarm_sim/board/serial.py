@@ -1,6 +1,6 @@
 """The host's end of the Uno's serial line, in emulated time.
 
-Frames are 8N1, ten bits a byte (ATmega328P datasheet, 19.4). Host to board, bytes follow one another without
+Frames are 8N1, ten bits a byte (ATmega328P datasheet, 20.4). Host to board, bytes follow one another without
 gaps; board to host, a byte can be read once its stop bit has passed. The host samples in the middle of its own
 bits, so a program that set another baud rate is received as garbage here as well.
 """
@@ -9,9 +9,8 @@ from __future__ import annotations
 
 from collections import deque
 from dataclasses import dataclass
-from typing import Any
 
-from numpy.typing import NDArray
+import numpy as np
 
 from planarm_sim.cpu.chip import Chip
 from planarm_sim.errors import UsageError
@@ -21,7 +20,7 @@ __all__ = ["CLOCK_HZ", "FRAME_BITS", "SerialPort", "SerialState"]
 CLOCK_HZ = 16_000_000
 FRAME_BITS = 10
 MAX_BAUD = 2_000_000
-"""Fastest rate of the chip's receiver at 16 MHz (datasheet, 19.10)."""
+"""Fastest rate of the chip's receiver at 16 MHz (datasheet, 20.10)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,8 +103,12 @@ class SerialPort:
 
     def collect(self) -> None:
         """Fetch the frames that the chip has sent; the board calls this after every run."""
-        for frame in self._chip.drain_tx():
-            self._receive(frame)
+        frames = self._chip.drain_tx()
+        if np.all(frames["bit_cycles"].astype(np.int64) * self._baud == CLOCK_HZ):
+            self._received += frames["byte"].astype(np.uint8).tobytes()
+        else:
+            for byte, bit_cycles in frames[["byte", "bit_cycles"]].tolist():
+                self._sample(byte, bit_cycles)
 
     def snapshot(self) -> SerialState:
         """Copy the line's state."""
@@ -130,16 +133,12 @@ class SerialPort:
         """First cycle after the last byte written; exact, so that no rounding adds up over a burst."""
         return self._burst_start - (-self._burst_bytes * FRAME_BITS * CLOCK_HZ // self._baud)
 
-    def _receive(self, frame: NDArray[Any]) -> None:
-        """Sample one frame as the host's UART does, from its start bit on; the line is high when it has ended."""
-        byte, board_bit = int(frame["byte"]), int(frame["bit_cycles"])
-        if board_bit * self._baud == CLOCK_HZ:
-            self._received.append(byte)
-            return
+    def _sample(self, byte: int, board_bit_cycles: int) -> None:
+        """Receive one frame as a UART of another rate does, from its start bit on; the line is high after it."""
         wave = byte << 1 | 0x200  # start bit, eight data bits from the lowest on, stop bit
-        host_bit = CLOCK_HZ / self._baud
-        samples = [wave >> min(int((n + 0.5) * host_bit / board_bit), FRAME_BITS - 1) & 1 for n in range(FRAME_BITS)]
+        ratio = CLOCK_HZ / self._baud / board_bit_cycles
+        samples = [wave >> min(int((n + 0.5) * ratio), FRAME_BITS - 1) & 1 for n in range(FRAME_BITS)]
         if samples[0] == 1:
-            return  # the host's start bit check finds the line high again: a spike
+            return  # the middle of the host's start bit finds the line high again: a spike
         self._framing_errors += samples[-1] == 0
         self._received.append(sum(bit << n for n, bit in enumerate(samples[1:-1])))

@@ -129,12 +129,12 @@ class Bridge:
         self._sleep()
 
     def _notice_open(self) -> None:
-        is_open = self._line.is_open()
-        if is_open and not self._is_open:
+        if self._line.opened():
             self._opened += 1
+            self._lost += len(self._uno.serial.read())  # nobody was there
             if self._reset_on_open:
                 self._uno.reset()
-        self._is_open = is_open
+        self._is_open = self._line.is_open()
 
     def _target_cycle(self) -> int:
         uno = self._uno

@@ -31,6 +31,10 @@ class Line(Protocol):
         """Tell whether a host has the line open, or has closed it with bytes still to be read."""
         ...
 
+    def opened(self) -> bool:
+        """Tell whether a host has opened the line since the last call, also if it has closed it again."""
+        ...
+
     def read(self, most: int) -> bytes:
         """Take up to `most` bytes that the host sent; b"" when there are none now."""
         ...

@@ -1,7 +1,7 @@
 """A pseudo-terminal that looks like the Uno's serial port: hosts open it by path, close it and open it again.
 
 A pty is not a UART: it takes any baud rate and ignores it, buffers some kilobytes, and has no DTR line. Pacing is
-therefore the bridge's work, and "a host opened the port" is seen from the hang-up state of the master side.
+therefore the bridge's work, and "a host opened the port" is seen by watching the terminal's file.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Self
 
+from planarm_sim.bridge.open_watch import watch_opening
 from planarm_sim.errors import BridgeError
 
 __all__ = ["PtyLine"]
@@ -42,6 +43,8 @@ class PtyLine:
         finally:
             os.close(slave)
         os.set_blocking(self._fd, False)
+        self._watch = watch_opening(self.path)
+        self._was_open = False
         self._poll = select.poll()
         self._poll.register(self._fd, select.POLLIN)
         self._link = Path(link) if link is not None else None
@@ -54,12 +57,19 @@ class PtyLine:
                 link.unlink()
             link.symlink_to(self.path)
         except OSError as error:
-            os.close(self._fd)
+            self._close_terminal()
             raise BridgeError(f"cannot link {link} to {self.path}: {error.strerror}; give another --link") from error
 
     def is_open(self) -> bool:
         """Tell whether a host has the terminal open, or has closed it with bytes still to be read."""
         return all(events & select.POLLIN or not events & select.POLLHUP for _, events in self._poll.poll(0))
+
+    def opened(self) -> bool:
+        """Tell whether a host has opened the terminal since the last call, also if it has closed it again."""
+        if self._watch is not None:
+            return self._watch.opened()
+        was_open, self._was_open = self._was_open, self.is_open()
+        return self._was_open and not was_open
 
     def read(self, most: int) -> bytes:
         """Take up to `most` bytes that the host sent; b"" when there are none, or when it has closed."""
@@ -78,15 +88,22 @@ class PtyLine:
             return 0
 
     def wait(self, timeout_s: float, *, for_bytes: bool) -> None:
-        """Sleep for `timeout_s`, or, when `for_bytes`, until the host sends or closes, if that comes first."""
+        """Sleep for `timeout_s`, or until a host opens or, when `for_bytes`, sends or closes, if that comes first."""
         # A terminal nobody has open reports a hang-up at once, for ever: it must not be waited for.
         watched = [self._fd] if for_bytes and self.is_open() else []
+        if self._watch is not None:
+            watched.append(self._watch.fd)
         select.select(watched, [], [], max(timeout_s, 0.0))
 
     def close(self) -> None:
         """Remove the link, if it is still this terminal's, and close the terminal."""
         if self._link is not None and self._link.is_symlink() and str(self._link.readlink()) == self.path:
             self._link.unlink()
+        self._close_terminal()
+
+    def _close_terminal(self) -> None:
+        if self._watch is not None:
+            self._watch.close()
         os.close(self._fd)
 
     def __enter__(self) -> Self:

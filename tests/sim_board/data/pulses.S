@@ -1,5 +1,5 @@
 ; OC1A (D9) toggles every 800 cycles, OC1B (D10) too: Timer1 in CTC mode, no prescaler (ATmega328P datasheet,
-; 15.9.2). D13 follows D2. Needs no serial line.
+; 16.9.2). D13 follows D2. Needs no serial line.
 #include "uno.inc"
 .global main
 main:
