@@ -173,15 +173,15 @@ def random_tip(rng):
 
 def judge(scene, world, verdict, share, points, counts):
     """What each verdict promises, against 401 poses on the move."""
-    counts[verdict] += 1
+    at_limit = verdict == UNPROVED and limit_is_near(scene, world, points(np.array([share])))
+    counts[verdict] += not at_limit
     spare = spare_cm(scene, world, points(SHARES))
     if verdict == PROVED:
         assert spare.min() > 0.0
     elif verdict == BLOCKED:
         assert spare_cm(scene, world, points(np.array([share])))[0] <= 1e-9
-    else:
-        around = points(np.array([share]))
-        assert spare_cm(scene, world, around)[0] < 60 * SMALLEST_CM or limit_is_near(scene, world, around)
+    elif not at_limit:
+        assert spare_cm(scene, world, points(np.array([share])))[0] < 60 * SMALLEST_CM
     if spare.min() <= 0.0:
         assert verdict != PROVED
 

@@ -118,7 +118,8 @@ def prove_line(world: ArmWorld, x0: float, y0: float, x1: float, y1: float) -> t
 
     Returns:
         (verdict, parameter): PROVED; or BLOCKED with the share of the move, 0 to 1, at which the pose is not free; or
-        UNPROVED with the share around which the margin is too small for a proof.
+        UNPROVED with the share around which the margin is too small for a proof, or joint 1 comes to the end of its
+        limits (at the ends of a full turn no single pose is forbidden, only the way across).
     """
     arm = world.arm
     dx, dy = x1 - x0, y1 - y0
