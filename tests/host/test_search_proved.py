@@ -117,7 +117,7 @@ def test_table_1_case_2_with_chs_is_free_when_proved_and_not_when_nodes_are_chec
         )
         for moves in ("nodes", "proved")
     }
-    assert clearances["nodes"] < free_map.margin_cm < clearances["proved"]
+    assert clearances["nodes"] < 0.2 < free_map.margin_cm < clearances["proved"]
 
 
 @cache
