@@ -41,13 +41,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
             seconds=options.seconds,
             reset_on_open=not options.no_reset_on_open,
             announce=_print_line,
-            say=lambda text: _print_line(f"note: {text}"),
+            say=_note,
         )
     except SimError as error:
         sys.stderr.write(f"error: {error}\n")
         return EXIT_BAD_INPUT
-    for text in (*(f"note: {warning}" for warning in result.warnings), summary(result)):
-        _print_line(text)
+    for warning in result.warnings:
+        _note(warning)
+    _print_line(summary(result))
     return EXIT_PROGRAM_FAILED if result.program_failed else EXIT_OK
 
 
@@ -64,6 +65,10 @@ def summary(result: Emulation) -> str:
 def _print_line(text: str) -> None:
     sys.stdout.write(f"{text}\n")
     sys.stdout.flush()
+
+
+def _note(text: str) -> None:
+    sys.stderr.write(f"note: {text}\n")
 
 
 if __name__ == "__main__":

@@ -89,6 +89,7 @@ def emulate(
             "this system has no pseudo-terminals; use planarm --port sim://, which needs none, or Linux or macOS"
         ) from error
     uno = Uno.from_file(image_path, baud=baud)
+    uno.run(cycles=1)  # compiles the chip, or loads it from the cache: a host that opens the terminal need not wait
     with _stopped_by_signals() as stop, PtyLine(link) as line:
         announce(line.path)
         return run_board(
@@ -117,7 +118,7 @@ def run_board(
     say: Callable[[str], None],
 ) -> Emulation:
     """As `emulate`, with a board, a line, a clock and a way to stop it of the caller's."""
-    uno.run(cycles=1)  # compiles the chip, or loads it from the cache: seconds that are nobody's lag
+    uno.run(cycles=1)  # compiles the chip, if nobody has: seconds that are nobody's lag
     start_cycle, start_s = uno.cycle, clock.now_s()
     with ExitStack() as stack:
         edges = _EdgeSink(uno, stack.enter_context(_open_vcd(uno, vcd)) if vcd is not None else None)

@@ -170,6 +170,13 @@ def test_front_end_prints_the_path_then_the_closing_line(capsys):
     assert "rising edges: D9 100, D10 100" in lines[-1]
 
 
+def test_front_end_keeps_notes_out_of_its_output(capsys):
+    assert main([str(DATA / "unmodelled.hex"), "--seconds", "0.01", "--speed", "max"]) == 0
+    captured = capsys.readouterr()
+    assert len(captured.out.splitlines()) == 2
+    assert "note: TWBR (0xB8) belongs to a part that is not modelled" in captured.err
+
+
 def test_front_end_names_what_is_wrong(capsys, tmp_path):
     assert main([str(tmp_path / "none.hex")]) == 2
     assert "none.hex: cannot be read" in capsys.readouterr().err

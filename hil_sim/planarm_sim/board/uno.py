@@ -25,6 +25,8 @@ from planarm_sim.trace import EDGE, VcdWriter
 __all__ = ["CLOCK_HZ", "Pin", "Uno", "UnoSnapshot"]
 
 DEFAULT_BAUD = messages.BAUD
+_NO_EDGES = np.empty(0, EDGE_DTYPE)
+_PIN_INDICES = tuple(pin.index for pin in PINS)
 
 
 @dataclass(frozen=True, slots=True)
@@ -206,7 +208,8 @@ class Uno:
 
     def clear_edges(self) -> None:
         """Forget the level changes recorded so far, of all pins."""
-        self.take_edges()
+        self._edges = []
+        self._log_start_cycle, self._log_start_levels = self.cycle, self._levels()
 
     def take_edges(self) -> NDArray[Any]:
         """Return the level changes of all pins recorded so far and forget them; for runs without end.
@@ -214,9 +217,10 @@ class Uno:
         Returns:
             Structured array in order of time, fields cycle, pin (chip numbering, see `pins`) and level.
         """
+        if not self._edges:
+            return _NO_EDGES
         taken = self._recorded()
-        self._edges = []
-        self._log_start_cycle, self._log_start_levels = self.cycle, self._levels()
+        self.clear_edges()
         return taken
 
     def write_vcd(self, path: str | Path, names: Sequence[str]) -> None:
@@ -269,8 +273,8 @@ class Uno:
     def _recorded(self) -> NDArray[Any]:
         """All recorded edges in one array; joined once, then kept so."""
         if len(self._edges) != 1:
-            self._edges = [np.concatenate([np.empty(0, EDGE_DTYPE), *self._edges])]
+            self._edges = [np.concatenate([_NO_EDGES, *self._edges])]
         return self._edges[0]
 
     def _levels(self) -> tuple[int, ...]:
-        return tuple(self._chip.pin_level(place.index) for place in PINS)
+        return tuple(self._chip.pin_level(index) for index in _PIN_INDICES)
