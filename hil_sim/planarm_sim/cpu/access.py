@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from planarm_wire.kernel_cache import kernel
+from planarm_sim.cpu.compiled import kernel  # kernel_cache: see there
 
 from planarm_sim.cpu.bus import IVSEL, read_data_space, read_io, write_data_space, write_io
 from planarm_sim.cpu.flags import I

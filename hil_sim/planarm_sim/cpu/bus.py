@@ -8,7 +8,7 @@ instruction.
 from __future__ import annotations
 
 import numpy as np
-from planarm_wire.kernel_cache import kernel
+from planarm_sim.cpu.compiled import kernel  # kernel_cache: see there
 
 from planarm_sim.cpu.layout import (
     CYCLE,
@@ -171,7 +171,6 @@ def write_io(st: State, eeprom: Bytes, address: int, value: int) -> None:
         write_timer1(st, address, value, cycle)
     elif address == UDR0:
         write_data(st, value, cycle)
-        st[HORIZON] = 0
     elif TCCR0A <= address <= OCR0B or TCCR2A <= address <= OCR2B:
         write_timer8(st, TIMER0 if address <= OCR0B else TIMER2, address, value, cycle)
     elif address in (GPIOR0, GPIOR1, GPIOR2):

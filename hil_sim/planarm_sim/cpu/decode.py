@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from planarm_sim.cpu import opcodes as op
 from planarm_sim.cpu.layout import CONSTANTS
-from planarm_sim.cpu.registers import IO_START, READS_PLAIN, SREG
+from planarm_sim.cpu.registers import GPIOR0, GPIOR1, GPIOR2, IO_START, READS_PLAIN, SREG
 
 FLASH_BYTES = 32 * 1024
 FLASH_WORDS = FLASH_BYTES // 2
@@ -119,7 +119,7 @@ _TWO_WORDS = (op.LDS, op.STS, op.JUMP3, op.CALL)
 _SKIPS = (op.CPSE, op.SBIC, op.SBIS, op.SBRC, op.SBRS)
 _WIDE = (op.ADIW, op.SBIW)
 _RELATIVE = {op.JUMP2: 12, op.RCALL: 12, op.BRBS: 7, op.BRBC: 7}
-_AFTER_READ = {op.IN: op.MOV, op.SBIC: op.SBRC, op.SBIS: op.SBRS}
+_ON_PLAIN_READS = {op.IN: op.MOV, op.SBIC: op.SBRC, op.SBIS: op.SBRS}
 """What to do instead with an I/O register that always reads as last written: it is one more register."""
 _SREG_FORMS = {op.IN: op.IN_SREG, op.OUT: op.OUT_SREG}
 
@@ -217,8 +217,10 @@ def _specialised(operation: int, d: _Words, r: _Words) -> _Words:
     """Return the operation of each word, replaced where the I/O register that it names allows a shorter way."""
     address = r if operation == op.IN else d
     result = np.full_like(d, operation)
-    if operation in _AFTER_READ:
-        result[READS_PLAIN[address]] = _AFTER_READ[operation]
+    if operation in _ON_PLAIN_READS:
+        result[READS_PLAIN[address]] = _ON_PLAIN_READS[operation]
+    if operation == op.OUT:
+        result[np.isin(address, (GPIOR0, GPIOR1, GPIOR2))] = op.MOV
     if operation in _SREG_FORMS:
         result[address == SREG] = _SREG_FORMS[operation]
     return result

@@ -8,7 +8,7 @@ program counter.
 
 from __future__ import annotations
 
-from planarm_wire.kernel_cache import kernel
+from planarm_sim.cpu.compiled import kernel  # kernel_cache: see there
 
 from planarm_sim.cpu import access as io
 from planarm_sim.cpu import opcodes as op
@@ -59,7 +59,9 @@ def run(st: State, sram: Bytes, eeprom: Bytes, code: State, flash: Bytes, target
             st[SP] = sp
             access = st[ACCESS]
             if access != io.NOTHING:
-                process_events(st, eeprom, cycle - 1 if access <= io.LAST_READ else cycle)
+                until = cycle - 1 if access <= io.LAST_READ else cycle
+                if until >= st[HORIZON]:  # no event is due before the horizon
+                    process_events(st, eeprom, until)
                 st[PC] = st[ACCESS_PC]
                 pc = access_data(st, sram, eeprom, pc)
             st[PC] = pc

@@ -6,7 +6,7 @@ instruction decides; the caller keeps the others.
 
 from __future__ import annotations
 
-from planarm_wire.kernel_cache import kernel
+from planarm_sim.cpu.compiled import kernel  # kernel_cache: see there
 
 C, Z, N, V, S, H, T, I = (1 << bit for bit in range(8))  # noqa: E741 - the manual's names
 KEEP_IT = I | T

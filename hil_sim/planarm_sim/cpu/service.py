@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from planarm_wire.kernel_cache import kernel
+from planarm_sim.cpu.compiled import kernel  # kernel_cache: see there
 
 from planarm_sim.cpu.events import process_events
 from planarm_sim.cpu.flags import I

@@ -6,7 +6,7 @@ A change of a pin acts PIPE_DELAY = 3 cycles later: latch, two synchroniser stag
 
 from __future__ import annotations
 
-from planarm_wire.kernel_cache import kernel
+from planarm_sim.cpu.compiled import kernel  # kernel_cache: see there
 
 from planarm_sim.cpu.layout import (
     DUE_CAPTURE,

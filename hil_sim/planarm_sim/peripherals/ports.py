@@ -8,7 +8,7 @@ seen by an IN only with one instruction between them).
 from __future__ import annotations
 
 import numpy as np
-from planarm_wire.kernel_cache import kernel
+from planarm_sim.cpu.compiled import kernel  # kernel_cache: see there
 
 from planarm_sim.cpu.layout import (
     CHANGED_AT,

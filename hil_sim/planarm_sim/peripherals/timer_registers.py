@@ -6,7 +6,7 @@ ATmega328P datasheet, 15.9, 16.11 and 18.11. All 16-bit registers of timer 1 sha
 from __future__ import annotations
 
 import numpy as np
-from planarm_wire.kernel_cache import kernel
+from planarm_sim.cpu.compiled import kernel  # kernel_cache: see there
 
 from planarm_sim.cpu.layout import (
     AT_BOTTOM,

@@ -8,7 +8,7 @@ and the pin one timer clock after TCNT = OCRnx (figures 15-10, 15-11, 16-10), TO
 
 from __future__ import annotations
 
-from planarm_wire.kernel_cache import kernel
+from planarm_sim.cpu.compiled import kernel  # kernel_cache: see there
 
 from planarm_sim.cpu.layout import (
     AT_BOTTOM,

@@ -13,7 +13,7 @@ shift register's place (20.7.4: DOR is set when its start bit is found, so the o
 from __future__ import annotations
 
 import numpy as np
-from planarm_wire.kernel_cache import kernel
+from planarm_sim.cpu.compiled import kernel  # kernel_cache: see there
 
 from planarm_sim.cpu.layout import (
     BAUD_ORIGIN,

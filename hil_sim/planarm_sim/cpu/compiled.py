@@ -1,0 +1,22 @@
+"""Compiles the chip's kernels without reference counts."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, TypeVar
+
+from planarm_wire import kernel_cache
+
+F = TypeVar("F", bound=Callable[..., Any])
+
+
+def kernel(function: F) -> F:
+    """Compile `function` as `planarm_wire.kernel_cache.kernel` does, for a kernel that makes no arrays.
+
+    Numba counts references to every array that a function is given, with two atomic additions per array and
+    call: more than most of these kernels take for their work. Without its run-time library it does not.
+    """
+    compiled: Any = kernel_cache.kernel(function)
+    if hasattr(compiled, "targetoptions"):  # plain Python when the compiler is switched off
+        compiled.targetoptions["_nrt"] = False
+    return compiled
