@@ -1,6 +1,8 @@
 """Program files. The records are built here from the formats' definitions, by other code than the readers'."""
 
+import shutil
 import struct
+import subprocess
 from pathlib import Path
 
 import pytest
@@ -11,6 +13,7 @@ from planarm_sim.loader import FLASH_BYTES, load_elf, load_hex, load_image
 from planarm_sim.loader.elf import parse_elf
 from planarm_sim.loader.intel_hex import parse_hex
 
+DATA = Path(__file__).parent / "data"
 END = ":00000001FF"
 
 
@@ -231,3 +234,32 @@ def test_first_bytes_tell_the_kind_of_file(tmp_path: Path):
     as_hex.write_text(f"{record(0, 0, b'same')}\n{END}\n")
     assert load_image(as_elf).flash == load_image(as_hex).flash == load_elf(as_elf).flash
     assert load_image(as_elf).source == str(as_elf)
+
+
+# --- what avr-gcc makes ---
+
+
+@pytest.mark.skipif(
+    shutil.which("avr-gcc") is None, reason="avr-gcc is not installed: the test programs are not rebuilt"
+)
+@pytest.mark.parametrize("name", ["echo", "pulses", "unmodelled"])
+def test_elf_and_hex_of_avr_gcc_are_the_kept_program(tmp_path: Path, name):
+    built = tmp_path / f"{name}.elf"
+    flags = ["-mmcu=atmega328p", "-nostdlib", "-Wl,-e,main"]
+    subprocess.run(["avr-gcc", *flags, "-o", built, DATA / f"{name}.S"], check=True)
+    subprocess.run(["avr-objcopy", "-O", "ihex", built, tmp_path / f"{name}.hex"], check=True)
+    kept = load_hex(DATA / f"{name}.hex")
+    assert load_elf(built).flash == kept.flash, "run make in tests/sim_board/data"
+    assert load_hex(tmp_path / f"{name}.hex").flash == kept.flash
+
+
+@pytest.mark.skipif(
+    shutil.which("avr-gcc") is None, reason="avr-gcc is not installed: nothing to build for another chip"
+)
+def test_a_program_built_for_another_chip_is_refused(tmp_path: Path):
+    source, built = tmp_path / "main.c", tmp_path / "main.elf"
+    source.write_text("int main(void) { return 0; }")
+    for part, words in (("atmega644p", "built for atmega644p"), ("atmega2560", "AVR family 6")):
+        subprocess.run(["avr-gcc", f"-mmcu={part}", "-o", built, source], check=True)
+        with pytest.raises(ImageError, match=words):
+            load_elf(built)
