@@ -9,11 +9,12 @@ from planarm.search.open_list import BUCKET, MADE, NONE, WAITING, make_open_list
 LONGEST_CM = 1.0
 
 
-def push(queue, bucket, f_cm, node):
+def push(queue, bucket, f_cm, node, live):
     """Put an entry where the search puts it."""
     entry, place = queue.counts[MADE], max(bucket, queue.counts[BUCKET]) & (queue.ring.size - 1)
     queue.f_cm[entry], queue.node[entry], queue.below[entry] = f_cm, node, queue.ring[place]
     queue.ring[place] = entry
+    live[node] = entry
     queue.counts[MADE] += 1
     queue.counts[WAITING] += 1
 
@@ -23,7 +24,7 @@ def push(queue, bucket, f_cm, node):
 def test_entries_leave_as_from_one_heap_lowest_f_first_then_newest(buckets_per_cm, seed):
     random = np.random.default_rng(seed)
     nodes = 60
-    closed = np.zeros(nodes, np.uint8)
+    live = np.full(nodes, NONE)
     queue = make_open_list(2.0 * LONGEST_CM * buckets_per_cm, 8)
     heap, made, f_cm = [], 0, 0.0
     while made < 500:
@@ -33,22 +34,20 @@ def test_entries_leave_as_from_one_heap_lowest_f_first_then_newest(buckets_per_c
             node = int(random.integers(nodes))
             if made == queue.node.size:
                 queue = with_more_room(queue)
-            push(queue, int(new_f * buckets_per_cm), new_f, node)
+            push(queue, int(new_f * buckets_per_cm), new_f, node, live)
             heapq.heappush(heap, (new_f, -made, node))
             made += 1
-        if random.random() < 0.03:
-            closed[random.integers(nodes)] = 1
-        while heap and closed[heap[0][2]]:
+        if random.random() < 0.1:  # a node is closed: none of its entries counts any more
+            live[random.integers(nodes)] = NONE
+        while heap and live[heap[0][2]] != -heap[0][1]:
             heapq.heappop(heap)
         expected = heap[0][2] if heap else NONE
-        node = pop(*queue, closed)
+        node = pop(*queue, live)
         assert node == expected
         if heap:
             f_cm = heapq.heappop(heap)[0]
-        elif node == NONE:
-            closed[:] = 0
     assert made >= 500
 
 
 def test_an_empty_list_gives_no_node():
-    assert pop(*make_open_list(1.0, 4), np.zeros(3, np.uint8)) == NONE
+    assert pop(*make_open_list(1.0, 4), np.full(3, NONE)) == NONE

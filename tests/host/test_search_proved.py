@@ -10,10 +10,11 @@ import shapely
 from host_scenes import make_scene, random_obstacles
 from planarm.model.shapes import Circle, shape_of
 from planarm.search.best_first import line_is_free
+from planarm.search.draw import draw_subset
 from planarm.search.grid_search import find_path
 from planarm.search.lattice import make_lattice, node_at
 from planarm.search.result import SearchStatus
-from planarm.search.stencils import cover, stencil
+from planarm.search.stencils import DRAWN, cover, stencil
 from planarm.workspace.free_map import build_free_map
 from planarm.workspace.proof import PROVED, prove_line
 from planarm.workspace.world import FREE
@@ -66,6 +67,12 @@ def least_clearance_cm(scene, points_cm):
         radius = shape.radius_cm if isinstance(shape, Circle) else 0.0
         clearance = min(clearance, *(shapely.distance(link, filled).min() - radius for link in (first, second)))
     return clearance
+
+
+def lattice_node(lattice, free_map, ix, iy):
+    """The lattice's node of the map's node [iy, ix]."""
+    column, row = (round(value / free_map.cell_cm) for value in (free_map.x_cm[ix], free_map.y_cm[iy]))
+    return node_at(lattice, column, row)
 
 
 @cache
@@ -121,42 +128,81 @@ def test_table_1_case_2_with_chs_is_free_when_proved_and_not_when_nodes_are_chec
 
 
 @cache
-def proved_graph(seed, algorithm, neighbours):
-    """All moves of the whole neighbourhood that `prove_line` proves, as a matrix over the map's nodes."""
+def proved_moves(seed, algorithm, neighbours):
+    """All moves of the neighbourhood between free nodes, as {((ix, iy), (dx, dy)): proved or not}, both ways."""
     _, free_map, _, _ = random_case(seed)
     rows, columns = free_map.region.shape
-    heads, tails, lengths = [], [], []
-    for iy, ix in np.argwhere(free_map.region == FREE):
+    verdicts = {}
+    for iy, ix in np.argwhere(free_map.region == FREE).tolist():
         for dx, dy in stencil(algorithm, neighbours).tolist():
             x, y = ix + dx, iy + dy
             forward = dy > 0 or (dy == 0 and dx > 0)
-            if not (forward and 0 <= x < columns and y < rows and free_map.region[y, x] == FREE):
-                continue
-            line = free_map.x_cm[ix], free_map.y_cm[iy], free_map.x_cm[x], free_map.y_cm[y]
-            if prove_line(free_map.world, *line)[0] == PROVED:
-                heads.append(iy * columns + ix)
-                tails.append(y * columns + x)
-                lengths.append(free_map.cell_cm * hypot(dx, dy))
-    return csr_matrix((lengths, (heads, tails)), shape=(rows * columns,) * 2)
+            if forward and 0 <= x < columns and y < rows and free_map.region[y, x] == FREE:
+                line = free_map.x_cm[ix], free_map.y_cm[iy], free_map.x_cm[x], free_map.y_cm[y]
+                proved = prove_line(free_map.world, *line)[0] == PROVED
+                verdicts[(ix, iy), (dx, dy)] = verdicts[(x, y), (-dx, -dy)] = proved
+    return verdicts
 
 
-@pytest.mark.parametrize(("algorithm", "neighbours"), [("a_star", 8), ("modified_a_star", 24), ("chs", 12)])
-@pytest.mark.parametrize("seed", [7, 11, 13])
-def test_the_length_is_dijkstras_on_the_graph_of_all_proved_moves(algorithm, neighbours, seed):
-    """The search uses primitive moves only and accepts cells that are free as a whole unseen; neither shows."""
+def shortest_cm(seed, algorithm, neighbours, offered):
+    """Dijkstra over the proved moves that `offered((ix, iy), (dx, dy))` lets a node have."""
     _, free_map, start_cm, goal_cm = random_case(seed)
+    rows, columns = free_map.region.shape
+    edges = [
+        (iy * columns + ix, (iy + dy) * columns + ix + dx, free_map.cell_cm * hypot(dx, dy))
+        for ((ix, iy), (dx, dy)), proved in proved_moves(seed, algorithm, neighbours).items()
+        if proved and offered((ix, iy), (dx, dy))
+    ]
+    tails, heads, lengths = zip(*edges, strict=True)
+    graph = csr_matrix((lengths, (tails, heads)), shape=(rows * columns,) * 2)
+    start, goal = (
+        int(np.argmin(np.abs(free_map.y_cm - y))) * columns + int(np.argmin(np.abs(free_map.x_cm - x)))
+        for x, y in (start_cm, goal_cm)
+    )
+    return dijkstra(graph, indices=start)[goal]
 
-    def place(point_cm):
-        ix = int(np.argmin(np.abs(free_map.x_cm - point_cm[0])))
-        return int(np.argmin(np.abs(free_map.y_cm - point_cm[1]))) * len(free_map.x_cm) + ix
 
-    graph = proved_graph(seed, algorithm, neighbours)
-    expected_cm = dijkstra(graph, directed=False, indices=place(start_cm))[place(goal_cm)]
-    result = find_path(free_map, start_cm, goal_cm, planner(algorithm, neighbours, moves="proved"))
+def assert_length(result, expected_cm):
     if expected_cm == inf:
         assert result.status is SearchStatus.NO_PATH
     else:
         assert result.path.length_cm == pytest.approx(expected_cm, rel=1e-12)
+
+
+@pytest.mark.parametrize(("algorithm", "neighbours"), [("a_star", 8), ("modified_a_star", 24), ("chs", 12)])
+@pytest.mark.parametrize("seed", CASES[1::2])
+def test_the_length_is_dijkstras_on_the_graph_of_all_proved_moves(algorithm, neighbours, seed):
+    """The search proves few moves, uses primitive ones only, and accepts whole cells unseen; none of it shows."""
+    _, free_map, start_cm, goal_cm = random_case(seed)
+    result = find_path(free_map, start_cm, goal_cm, planner(algorithm, neighbours, moves="proved"))
+    assert_length(result, shortest_cm(seed, algorithm, neighbours, lambda node, move: True))
+
+
+@pytest.mark.parametrize("seed", CASES[1::2])
+def test_chaos_with_a_subset_at_each_expansion_is_dijkstras_on_the_drawn_and_proved_moves(seed):
+    _, free_map, start_cm, goal_cm = random_case(seed)
+    offsets = stencil("chaos_a_star", 20)
+    lattice = make_lattice(free_map, int(offsets.max()))
+    order = np.empty(20, np.int64)
+    draws = {}
+
+    def offered(node, move):
+        if node not in draws:
+            ix, iy = node
+            draw_subset(order, DRAWN[20], seed, 1 + lattice_node(lattice, free_map, ix, iy))
+            draws[node] = set(map(tuple, offsets[order[: DRAWN[20]]].tolist()))
+        return move in draws[node]
+
+    settings = planner("chaos_a_star", 20, moves="proved", subset="expansion", seed=seed)
+    result = find_path(free_map, start_cm, goal_cm, settings)
+    assert_length(result, shortest_cm(seed, "chaos_a_star", 20, offered))
+
+
+def test_many_of_the_moves_in_these_cases_cannot_be_proved():
+    """So the search has to fall back on second best ways."""
+    for seed in CASES[1::2]:
+        verdicts = list(proved_moves(seed, "modified_a_star", 24).values())
+        assert 0.005 < 1.0 - np.mean(verdicts) < 0.5
 
 
 @pytest.mark.parametrize(("algorithm", "neighbours"), [("a_star", 8), ("chs", 80)])
@@ -168,7 +214,7 @@ def test_a_move_is_as_free_one_way_as_the_other(algorithm, neighbours):
     nodes = rng.permutation(np.argwhere(free_map.region == FREE))[:60]
     verdicts = []
     for iy, ix in nodes.tolist():
-        a = node_at(lattice, ix + lattice.column + 5, iy + lattice.row + 5)
+        a = lattice_node(lattice, free_map, ix, iy)
         for dx, dy in offsets:
             b = a + dx + dy * lattice.width
             verdicts.append(line_is_free(lattice, free_map.world, a, b))

@@ -5,10 +5,13 @@ distance to the goal. No move is shorter than the straight line it makes, so h i
 final. Where the pseudo-code of paper C (figs. 3, 5, 7 and 9) never improves a node that is already open, this search
 does; without that the result is not the shortest path of the graph.
 
-Whether a move is legal is asked only when it would improve the node it leads to.
+Whether a move is legal is asked late, as in Lazy Weighted A* (described with its kin by Mandalika, Salzman and
+Srinivasa, Lazy Receding Horizon A*, ICAPS 2018): only of the move by which a node was reached best, when the node
+comes up for expansion. If that move is not legal, the next best way to the node from the closed ones takes its place.
+The result is the shortest path on the graph of legal moves, and few moves have to be proved.
 """
 
-from math import sqrt
+from math import inf, sqrt
 from typing import NamedTuple
 
 import numpy as np
@@ -97,14 +100,14 @@ def best_first(lattice: Lattice, moves: Moves, rules: Rules, world: ArmWorld, st
     queue = make_open_list(2.0 * longest_cm / lattice.cell_cm * BUCKETS_PER_CELL, FIRST_CAPACITY)
     g_cm = np.empty(lattice.shut.size)
     came_by = np.zeros(lattice.shut.size, np.uint8)
+    live = np.empty(lattice.shut.size, np.int64)
     h_cm = _distance_cm(lattice, start, goal)
-    g_cm[start], came_by[start] = 0.0, START
+    g_cm[start], came_by[start], live[start] = 0.0, START, 0
     queue.f_cm[0], queue.node[0], queue.below[0] = h_cm, start, NONE
     queue.ring[0], queue.counts[MADE], queue.counts[WAITING] = 0, 1, 1
     expanded = 0
     while True:
-        last, closed = expand(lattice, moves, rules, world, goal, h_cm, g_cm, came_by, queue)
-        expanded += closed
+        last, expanded = expand(lattice, moves, rules, world, goal, h_cm, g_cm, came_by, live, queue, expanded)
         if last != FULL:
             nodes = _trace(came_by, moves.jump, goal) if last == goal else []
             return Found(nodes, expanded, int(queue.counts[MADE]))
@@ -121,51 +124,100 @@ def expand(
     lowest_f_cm: float,
     g_cm: NDArray[np.float64],
     came_by: NDArray[np.uint8],
+    live: NDArray[np.int64],
     queue: OpenList,
+    expanded: int,
 ) -> tuple[int, int]:
-    """Expand nodes until the goal is closed; return (goal, or NONE if it cannot be reached, or FULL; nodes closed)."""
-    shut, whole, width, cell_cm = lattice.shut, lattice.whole, lattice.width, lattice.cell_cm
+    """Expand nodes until the goal is closed; return (goal, or NONE if it cannot be reached, or FULL; nodes expanded).
+
+    `g_cm` and `came_by` say how a node was reached best, `live` its entry on the open list; of a closed node `live`
+    is -2 less its turn: never an entry, and the smaller the later.
+    """
+    shut, width, cell_cm = lattice.shut, lattice.width, lattice.cell_cm
     dx, dy, jump, length_cm = moves.dx, moves.dy, moves.jump, moves.length_cm
-    cover_first, cover = moves.cover_first, moves.cover
     f_cm, queued, below, heap, ring, counts = queue
     goal_x, goal_y = goal % width, goal // width
-    order = np.arange(jump.size)
-    used = rules.drawn if rules.drawn > 0 else jump.size
-    closed = 0
-    while counts[MADE] + used <= f_cm.size:
-        node = pop(f_cm, queued, below, heap, ring, counts, shut)
+    every, only = np.arange(jump.size), np.empty(1, np.int64)
+    while counts[MADE] + jump.size <= f_cm.size:
+        node = pop(f_cm, queued, below, heap, ring, counts, live)
         if node == NONE:
-            return NONE, closed
-        shut[node] = 1
-        closed += 1
-        if node == goal:
-            return goal, closed
-        if rules.drawn > 0:
-            draw_subset(order, used, rules.seed, 1 + node)
-        x, y, from_g_cm = node % width, node // width, g_cm[node]
+            return NONE, expanded
+        if not rules.proved or came_by[node] == START or move_is_free(lattice, moves, world, node, came_by[node] - 1):
+            shut[node], live[node] = 1, -2 - expanded
+            expanded += 1
+            if node == goal:
+                return goal, expanded
+            source, order, used = node, every, jump.size
+            if rules.drawn > 0:
+                used = rules.drawn
+                draw_subset(order, used, rules.seed, 1 + node)
+        else:
+            only[0] = next_best_move(lattice, moves, rules, node, g_cm, came_by, live, every)
+            came_by[node] = UNSEEN
+            if only[0] == NONE:
+                continue
+            source, order, used = node - jump[only[0]], only, 1
+        x, y, from_g_cm = source % width - goal_x, source // width - goal_y, g_cm[source]
         for i in range(used):
             k = order[i]
-            to = node + jump[k]
-            to_g_cm = from_g_cm + length_cm[k]
+            to, to_g_cm = source + jump[k], from_g_cm + length_cm[k]
             if shut[to] or (came_by[to] != UNSEEN and to_g_cm >= g_cm[to]):
                 continue
-            if rules.proved:
-                crossed = cover_first[k]
-                while crossed < cover_first[k + 1] and whole[node + cover[crossed]]:
-                    crossed += 1
-                if crossed < cover_first[k + 1] and not line_is_free(lattice, world, node, to):
-                    continue
-            g_cm[to], came_by[to] = to_g_cm, 1 + k
-            to_goal_x, to_goal_y = x + dx[k] - goal_x, y + dy[k] - goal_y
-            to_f_cm = to_g_cm + cell_cm * sqrt(float(to_goal_x * to_goal_x + to_goal_y * to_goal_y))
+            to_f_cm = to_g_cm + cell_cm * sqrt(float((x + dx[k]) * (x + dx[k]) + (y + dy[k]) * (y + dy[k])))
             bucket = int((to_f_cm - lowest_f_cm) / cell_cm * BUCKETS_PER_CELL)
             place = max(bucket, counts[BUCKET]) & (ring.size - 1)  # below the current bucket only by rounding
             entry = counts[MADE]
+            g_cm[to], came_by[to], live[to] = to_g_cm, 1 + k, entry
             f_cm[entry], queued[entry], below[entry] = to_f_cm, to, ring[place]
             ring[place] = entry
             counts[MADE] += 1
             counts[WAITING] += 1
-    return FULL, closed
+    return FULL, expanded
+
+
+@kernel
+def next_best_move(
+    lattice: Lattice,
+    moves: Moves,
+    rules: Rules,
+    node: int,
+    g_cm: NDArray[np.float64],
+    came_by: NDArray[np.uint8],
+    live: NDArray[np.int64],
+    scratch: NDArray[np.int64],
+) -> int:
+    """Return the best move from a closed node to an open one after the move by which it was reached, or NONE.
+
+    Ways are ordered as the search finds them: by their length, then by the turn in which the node before was closed.
+    """
+    failed = node - moves.jump[came_by[node] - 1]
+    failed_g_cm, failed_live = g_cm[node], live[failed]
+    best, best_g_cm, best_live = NONE, inf, 0
+    for k in range(moves.jump.size):
+        source = node - moves.jump[k]
+        if not lattice.shut[source] or came_by[source] == UNSEEN:  # open, or never free
+            continue
+        through_g_cm = g_cm[source] + moves.length_cm[k]
+        tried = through_g_cm < failed_g_cm or (through_g_cm == failed_g_cm and live[source] >= failed_live)
+        worse = through_g_cm > best_g_cm or (through_g_cm == best_g_cm and live[source] < best_live)
+        if tried or worse:
+            continue
+        if rules.drawn > 0:
+            draw_subset(scratch, rules.drawn, rules.seed, 1 + source)
+            if not np.any(scratch[: rules.drawn] == k):
+                continue
+        best, best_g_cm, best_live = k, through_g_cm, live[source]
+    return best
+
+
+@kernel
+def move_is_free(lattice: Lattice, moves: Moves, world: ArmWorld, to: int, move: int) -> bool:
+    """Tell whether all poses of a move to the node `to` are free: all cells crossed are, or the line is proved."""
+    node = to - moves.jump[move]
+    for crossed in range(moves.cover_first[move], moves.cover_first[move + 1]):
+        if not lattice.whole[node + moves.cover[crossed]]:
+            return line_is_free(lattice, world, node, to)
+    return True
 
 
 @kernel

@@ -2,7 +2,7 @@
 
 Entries wait unsorted in buckets of equal width in f and enter a binary heap only when the search reaches their
 bucket. They leave exactly as from one heap over all of them (lowest f first, among equal f the newest), but entries
-that are never reached, or whose node was closed meanwhile, are never sorted. The buckets form a ring: with a
+that are never reached, or that a better one replaced meanwhile, are never sorted. The buckets form a ring: with a
 consistent heuristic no entry lies further than two of the longest moves above the one being expanded.
 
 The kernel gets the arrays one by one and is one flat function, and entries are pushed where they are made: Numba
@@ -62,8 +62,11 @@ def with_more_room(queue: OpenList) -> OpenList:
 
 
 @kernel
-def pop(f_cm: Floats, node: Ints, below: Ints, heap: Ints, ring: Ints, counts: Ints, closed: NDArray[np.uint8]) -> int:
-    """Remove the best entry whose node is not marked in `closed`; return its node, or NONE when there is none."""
+def pop(f_cm: Floats, node: Ints, below: Ints, heap: Ints, ring: Ints, counts: Ints, live: Ints) -> int:
+    """Remove the best entry that is the live one of its node; return the node, or NONE when there is no such entry.
+
+    `live` has for each node the entry that counts: the newest, none of them once the node is closed.
+    """
     size, waiting, bucket = counts[IN_HEAP], counts[WAITING], counts[BUCKET]
     mask = ring.size - 1
     best = NONE
@@ -72,7 +75,7 @@ def pop(f_cm: Floats, node: Ints, below: Ints, heap: Ints, ring: Ints, counts: I
         ring[bucket & mask] = NONE
         while entry != NONE:  # move the current bucket's entries into the heap
             waiting -= 1
-            if not closed[node[entry]]:
+            if live[node[entry]] == entry:
                 place = size
                 size += 1
                 while place > 0:
@@ -86,7 +89,8 @@ def pop(f_cm: Floats, node: Ints, below: Ints, heap: Ints, ring: Ints, counts: I
         if size == 0:
             bucket += 1
             continue
-        best = node[heap[0]]
+        top = heap[0]
+        best = node[top]
         size -= 1
         last = heap[size]
         place, child = 0, 1
@@ -101,7 +105,7 @@ def pop(f_cm: Floats, node: Ints, below: Ints, heap: Ints, ring: Ints, counts: I
             heap[place] = lower
             place, child = child, 2 * child + 1
         heap[place] = last
-        if closed[best]:
+        if live[best] != top:
             best = NONE
     counts[IN_HEAP], counts[WAITING], counts[BUCKET] = size, waiting, bucket
     return best
