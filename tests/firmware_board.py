@@ -1,4 +1,8 @@
-"""The firmware's core on a simulated board, driven from Python, and what a motion's edges should be."""
+"""The firmware on a board, driven from Python, and what a motion's edges should be.
+
+The board is either the core, built for this computer, on a simple simulation of its timer and pins, or the released
+flash image on the emulated Uno.
+"""
 
 from __future__ import annotations
 
@@ -8,10 +12,13 @@ from collections import deque
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Protocol
 
+from planarm_sim import Uno
 from planarm_wire.codec import decode, encode
 from planarm_wire.framing import Frame, FrameDecoder, encode_frame
 from planarm_wire.messages import (
+    BAUD,
     DIR_PINS,
     ENABLE_PIN,
     JOINTS,
@@ -33,6 +40,7 @@ from planarm_wire.messages import (
 from planarm_wire.steps import direction, duration_ticks, expand_moves
 
 LEAD_TICKS = 20_000
+ANSWER_TICKS = 120_000  # the longest frame, what it asks for, and the answer, on the line one after the other
 REST = Move(0, 0, 0, 0)
 
 
@@ -60,6 +68,58 @@ class _Edge(ctypes.Structure):
 
 class _Delays(ctypes.Structure):
     _fields_ = tuple((name, ctypes.c_uint32) for name in ("pass", "entry", "late_entry", "late_every", "leave"))
+
+
+class Firmware(Protocol):
+    """One board, as the host's end sees it. Ticks are cycles of 62.5 ns."""
+
+    def power_on(self, boot_count: int, tick: int, delays: Delays) -> None: ...
+
+    def receive(self, data: bytes) -> None: ...
+
+    def run(self, ticks: int) -> None: ...
+
+    def now(self) -> int: ...
+
+    def take_sent(self) -> bytes: ...
+
+    def take_edges(self) -> list[Edge]: ...
+
+
+class EmulatedFirmware:
+    """The released image on the emulated Uno. Boot counts, start ticks and delays are the chip's own."""
+
+    BOOT_CYCLES = 500_000
+
+    def __init__(self, image: Path) -> None:
+        self.uno = Uno.from_hex(image, baud=BAUD)
+        self.uno.run(cycles=self.BOOT_CYCLES)
+        self.uno.clear_edges()
+        self._booted = self.uno.snapshot()
+
+    def power_on(self, _boot_count: int, _tick: int, _delays: Delays) -> None:
+        self.uno.restore(self._booted)
+
+    def receive(self, data: bytes) -> None:
+        self.uno.serial.write(data)
+
+    def run(self, ticks: int) -> None:
+        self.uno.run(cycles=ticks)
+
+    def now(self) -> int:
+        return self.uno.cycle
+
+    def take_sent(self) -> bytes:
+        return self.uno.serial.read()
+
+    def take_edges(self) -> list[Edge]:
+        found = [
+            Edge(int(cycle), pin, int(level))
+            for pin in (*STEP_PINS, *DIR_PINS, ENABLE_PIN)
+            for cycle, level in self.uno.edges(pin)
+        ]
+        self.uno.clear_edges()
+        return sorted(found, key=lambda edge: edge.tick)
 
 
 class NativeFirmware:
@@ -138,7 +198,7 @@ class Board:
         """Send a frame (QUERY unless told otherwise) and return the STATUS that answers it."""
         self.replies.clear()
         self.send(Query() if message is None else message, seq=seq)
-        self.run(60_000)
+        self.run(ANSWER_TICKS)
         last = self.replies[-1][1]
         assert isinstance(last, Status), last
         return last
@@ -148,7 +208,7 @@ class Board:
         self.replies.clear()
         self.send(Hello(version, nonce), seq=seq)
         self.seq = (seq + 1) % 256
-        self.run(60_000)
+        self.run(ANSWER_TICKS)
         ((_, welcome),) = self.replies
         assert isinstance(welcome, Welcome), welcome
         return welcome

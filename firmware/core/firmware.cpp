@@ -54,10 +54,12 @@ void receive(uint32_t now_ticks) {
     }
 }
 
-void reply() {
-    if (!hal::serial_can_send()) return;
+// Sends the reply that is due. True when there was one.
+bool reply() {
+    if (!hal::serial_can_send()) return false;
     const uint8_t size = session::take_reply(reply_bytes);
     if (size != 0) hal::serial_send(reply_bytes, size);
+    return size != 0;
 }
 
 }  // namespace
@@ -74,12 +76,12 @@ void set_up(uint32_t boot_count, uint32_t now_ticks) {
 void pass() {
     const uint32_t now_ticks = clock::now();
     serve_motion(now_ticks);
+    if (reply()) return;
     if (session::is_busy()) {
         session::advance(now_ticks);
     } else {
         receive(now_ticks);
     }
-    reply();
 }
 
 }  // namespace firmware

@@ -10,7 +10,7 @@ namespace firmware {
 // ticks ago. Interrupts are still off.
 void set_up(uint32_t boot_count, uint32_t now_ticks);
 
-// One bounded pass: motion first, then a few received bytes or one segment, then a reply.
+// One bounded pass: motion first, then one piece of work: a reply, a segment, or a few received bytes.
 void pass();
 
 }  // namespace firmware

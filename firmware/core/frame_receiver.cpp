@@ -1,14 +1,14 @@
 #include "frame_receiver.h"
 
-#include "crc.h"
 #include "framing.h"
+#include "hal_crc.h"
 
 namespace planarm {
 
 FrameReceiver::Event FrameReceiver::receive(uint8_t byte) {
-    if (byte == wire::DELIMITER) return finish();
-    if (is_reserved(byte)) return Event::NONE;
-    if (byte == wire::ESCAPE) {
+    if (is_special(byte)) {
+        if (byte == wire::DELIMITER) return finish();
+        if (is_reserved(byte)) return Event::NONE;
         damaged_ = damaged_ || escaped_;
         escaped_ = true;
         return Event::NONE;
@@ -29,7 +29,7 @@ void FrameReceiver::append(uint8_t byte) {
         return;
     }
     buffer_[count_++] = byte;
-    crc_ = crc_update(crc_, byte);
+    crc_ = hal::crc_update(crc_, byte);
     if (count_ != PAYLOAD_AT) return;
 
     // A message followed by its own checksum leaves 0. The payload's checksum goes on from the header's.

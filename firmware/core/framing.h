@@ -8,16 +8,14 @@
 namespace planarm {
 
 // Kept for bytes outside of frames; never part of one.
-inline bool is_reserved(uint8_t byte) {
-    for (uint8_t code : wire::RESERVED) {
-        if (byte == code) return true;
-    }
-    return false;
-}
+constexpr bool is_reserved(uint8_t byte) { return byte == wire::RESERVED[0] || byte == wire::RESERVED[1]; }
 
-// Must be escaped inside a frame.
-inline bool is_special(uint8_t byte) {
-    return byte == wire::DELIMITER || byte == wire::ESCAPE || is_reserved(byte);
-}
+// Must be escaped inside a frame. The four codes are neighbours, which makes one comparison enough.
+constexpr uint8_t FIRST_SPECIAL = wire::RESERVED[0];
+static_assert(wire::RESERVED[1] == FIRST_SPECIAL + 1 && wire::ESCAPE == FIRST_SPECIAL + 2 &&
+                  wire::DELIMITER == FIRST_SPECIAL + 3,
+              "is_special looks at one range");
+
+constexpr bool is_special(uint8_t byte) { return static_cast<uint8_t>(byte - FIRST_SPECIAL) < 4; }
 
 }  // namespace planarm

@@ -12,6 +12,10 @@ namespace {
 // compare rightly.
 constexpr int32_t PREPARE_AHEAD_TICKS = 0x100000;
 
+// The first segment to be prepared must have come this long before its start: 0.5 ms, in which a pass of the
+// main program ends at the latest and the joint gets its DIR.
+constexpr int32_t LATEST_ARRIVAL_TICKS = 8000;
+
 static_assert((wire::QUEUE_SLOTS & (wire::QUEUE_SLOTS - 1)) == 0, "slot indices wrap by a mask");
 
 Segment slots[wire::QUEUE_SLOTS];
@@ -24,7 +28,7 @@ Rest queue_rest;   // at the end of the queue
 Rest staged_rest;  // at the end of the staged segments
 
 bool running;
-uint32_t oldest_start_ticks;   // start of the oldest queued segment
+uint32_t oldest_end_ticks;     // end of the oldest prepared segment
 uint32_t prepare_start_ticks;  // start of the next segment to be prepared
 uint32_t executed_segments;
 
@@ -44,21 +48,20 @@ void prepare_next(uint32_t now_ticks) {
         if (move.steps != 0) step_engine::append(joint, move, prepare_start_ticks);
     }
     prepare_start_ticks += segment.duration_ticks;
+    if (prepared == 0) oldest_end_ticks = prepare_start_ticks;
     ++prepared;
 }
 
 // Takes executed segments off the queue. True when the last of them ended the motion's data, as far as
 // received.
 bool retire(uint32_t now_ticks) {
-    while (prepared != 0) {
-        const uint32_t end_ticks = oldest_start_ticks + slot(0).duration_ticks;
-        if (!has_come(end_ticks, now_ticks)) return false;
-        oldest_start_ticks = end_ticks;
+    while (prepared != 0 && has_come(oldest_end_ticks, now_ticks)) {
         oldest = static_cast<uint8_t>((oldest + 1) & (wire::QUEUE_SLOTS - 1));
         --queued;
         --prepared;
         ++executed_segments;
         if (queued == 0) return true;
+        oldest_end_ticks += slot(0).duration_ticks;
     }
     return false;
 }
@@ -78,20 +81,27 @@ bool is_complete() {
     return filled != 0 && slot(static_cast<uint8_t>(filled - 1)).last;
 }
 
-wire::Result stage(Segment segment) {
+wire::Result stage(Reader& reader) {
     const uint8_t filled = static_cast<uint8_t>(queued + staged);
     if (filled == wire::QUEUE_SLOTS) return wire::Result::BUSY;
+    Segment& segment = slot(filled);
+    read_segment(reader, segment);
+    if (!reader.ok()) return wire::Result::MALFORMED;
     const wire::Result result = check_segment(segment, staged_rest);
-    if (result != wire::Result::OK) return result;
-    slot(filled) = segment;
-    ++staged;
-    return wire::Result::OK;
+    if (result == wire::Result::OK) ++staged;
+    return result;
 }
 
-void commit() {
+bool commit() {
+    const bool starving = running && prepared == queued;
+    if (starving && static_cast<int32_t>(prepare_start_ticks - clock::now()) < LATEST_ARRIVAL_TICKS) {
+        discard();
+        return false;
+    }
     queued = static_cast<uint8_t>(queued + staged);
     staged = 0;
     queue_rest = staged_rest;
+    return true;
 }
 
 void discard() {
@@ -104,7 +114,7 @@ bool is_empty() { return queued == 0; }
 uint8_t free_slots() { return static_cast<uint8_t>(wire::QUEUE_SLOTS - queued); }
 
 void start(uint32_t start_ticks) {
-    oldest_start_ticks = prepare_start_ticks = start_ticks;
+    prepare_start_ticks = start_ticks;
     running = true;
 }
 
@@ -134,11 +144,10 @@ Ledger ledger() {
     ledger.executed_segments = executed_segments;
     // After a missed step the clock no longer tells what was executed.
     const uint8_t timely = step_engine::missed() ? 0 : prepared;
-    uint32_t end_ticks = oldest_start_ticks;
-    for (uint8_t i = 0; i < timely; ++i) {
-        end_ticks += slot(i).duration_ticks;
-        if (!has_come(end_ticks, ledger.ticks)) break;
+    uint32_t end_ticks = oldest_end_ticks;
+    for (uint8_t i = 0; i < timely && has_come(end_ticks, ledger.ticks); ++i) {
         ++ledger.executed_segments;
+        end_ticks += slot(static_cast<uint8_t>(i + 1)).duration_ticks;
     }
     for (uint8_t joint = 0; joint < wire::JOINTS; ++joint)
         ledger.position_usteps[joint] = position.usteps[joint];

@@ -26,10 +26,12 @@ void reset();
 // True when a segment marked as the motion's last is queued or staged: nothing may follow it.
 bool is_complete();
 
-// Checks a segment against those before it and holds it back. OK, BUSY (no slot) or OUT_OF_RANGE.
-wire::Result stage(Segment segment);
-// Appends the staged segments.
-void commit();
+// Reads a segment, checks it against those before it and holds it back. OK, BUSY (no slot), MALFORMED or
+// OUT_OF_RANGE.
+wire::Result stage(Reader& reader);
+// Appends the staged segments. When they come too late for a motion that has nothing else left to do, it
+// forgets them and returns false: the motion then ends in an underrun, after the last step that came in time.
+bool commit();
 // Forgets the staged segments.
 void discard();
 

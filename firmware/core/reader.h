@@ -20,6 +20,8 @@ class Reader {
     int32_t varint();
 
   private:
+    uint32_t fail();
+
     const uint8_t* at_ = nullptr;
     const uint8_t* end_ = nullptr;
     bool ok_ = true;

@@ -1,7 +1,7 @@
 #include "reply.h"
 
-#include "crc.h"
 #include "framing.h"
+#include "hal_crc.h"
 #include "hal_serial.h"
 #include "motion.h"
 #include "supervisor.h"
@@ -14,27 +14,16 @@ namespace {
 
 uint32_t boot_nonce;
 
-// Encodes one frame: little-endian fields, stuffing, both checksums.
-class FrameWriter {
+// Collects a payload's fields, little-endian.
+class Fields {
   public:
-    FrameWriter(uint8_t* encoded, uint8_t seq, wire::MessageType type, uint8_t length)
-        : begin_(encoded), at_(encoded) {
-        u8(length);
-        u8(seq);
-        u8(static_cast<uint8_t>(type));
-        checksum();
-    }
-
-    void u8(uint8_t byte) {
-        crc_ = crc_update(crc_, byte);
-        stuff(byte);
-    }
+    void u8(uint8_t byte) { *at_++ = byte; }
 
     void u32(uint32_t value) {
-        for (uint8_t i = 0; i < 4; ++i) {
-            u8(static_cast<uint8_t>(value));
-            value >>= 8;
-        }
+        u8(static_cast<uint8_t>(value));
+        u8(static_cast<uint8_t>(value >> 8));
+        u8(static_cast<uint8_t>(value >> 16));
+        u8(static_cast<uint8_t>(value >> 24));
     }
 
     void ledger(const motion::Ledger& ledger) {
@@ -42,67 +31,80 @@ class FrameWriter {
         for (int32_t usteps : ledger.position_usteps) u32(static_cast<uint32_t>(usteps));
     }
 
-    uint8_t finish() {
-        checksum();
-        *at_++ = wire::DELIMITER;
-        return static_cast<uint8_t>(at_ - begin_);
-    }
+    const uint8_t* bytes() const { return bytes_; }
+    uint8_t size() const { return static_cast<uint8_t>(at_ - bytes_); }
 
   private:
-    // The payload's checksum starts from the header's, which is what `crc_` holds after it.
-    void checksum() {
-        stuff(static_cast<uint8_t>(crc_));
-        stuff(static_cast<uint8_t>(crc_ >> 8));
-    }
+    uint8_t bytes_[MAX_PAYLOAD];
+    uint8_t* at_ = bytes_;
+};
 
-    void stuff(uint8_t byte) {
+// Stuffs bytes and carries their checksum on; returns where the next byte goes.
+uint8_t* stuff(uint8_t* at, const uint8_t* bytes, uint8_t size, uint16_t& checksum) {
+    uint16_t crc = checksum;
+    for (; size != 0; --size) {
+        uint8_t byte = *bytes++;
+        crc = hal::crc_update(crc, byte);
         if (is_special(byte)) {
-            *at_++ = wire::ESCAPE;
+            *at++ = wire::ESCAPE;
             byte ^= wire::ESCAPE_XOR;
         }
-        *at_++ = byte;
+        *at++ = byte;
     }
+    checksum = crc;
+    return at;
+}
 
-    uint8_t* const begin_;
-    uint8_t* at_;
-    uint16_t crc_ = wire::CRC_INITIAL;
-};
+// Stuffs a checksum. The payload's starts from the header's, so `checksum` itself stays as it is.
+uint8_t* stuff_checksum(uint8_t* at, uint16_t checksum) {
+    const uint8_t bytes[] = {static_cast<uint8_t>(checksum), static_cast<uint8_t>(checksum >> 8)};
+    return stuff(at, bytes, wire::CRC_BYTES, checksum);
+}
+
+uint8_t encode(uint8_t* encoded, uint8_t seq, wire::MessageType type, const Fields& payload) {
+    const uint8_t header[wire::HEADER_BYTES] = {payload.size(), seq, static_cast<uint8_t>(type)};
+    uint16_t checksum = wire::CRC_INITIAL;
+    uint8_t* at = stuff(encoded, header, wire::HEADER_BYTES, checksum);
+    at = stuff_checksum(at, checksum);
+    at = stuff(at, payload.bytes(), payload.size(), checksum);
+    at = stuff_checksum(at, checksum);
+    *at++ = wire::DELIMITER;
+    return static_cast<uint8_t>(at - encoded);
+}
 
 }  // namespace
 
 void set_boot_nonce(uint32_t nonce) { boot_nonce = nonce; }
 
 uint8_t welcome(uint8_t* encoded, const session::Report& report, uint32_t host_nonce) {
-    constexpr uint8_t LENGTH = 1 + 4 + 4 + 4 + 3 + 4 + 4 * wire::JOINTS;
-    static_assert(LENGTH <= MAX_PAYLOAD, "buffer for replies");
-    FrameWriter frame(encoded, report.expected_seq, wire::MessageType::WELCOME, LENGTH);
-    frame.u8(wire::PROTOCOL_VERSION);
-    frame.u32(host_nonce);
-    frame.u32(boot_nonce);
-    frame.u32(wire::SPEC_HASH);
-    frame.u8(VERSION_MAJOR);
-    frame.u8(VERSION_MINOR);
-    frame.u8(VERSION_PATCH);
-    frame.ledger(motion::ledger());
-    return frame.finish();
+    static_assert(wire::WELCOME_BYTES == MAX_PAYLOAD && wire::WELCOME_BYTES >= wire::STATUS_BYTES,
+                  "the buffer's size");
+    Fields fields;
+    fields.u8(wire::PROTOCOL_VERSION);
+    fields.u32(host_nonce);
+    fields.u32(boot_nonce);
+    fields.u32(wire::SPEC_HASH);
+    fields.u8(VERSION_MAJOR);
+    fields.u8(VERSION_MINOR);
+    fields.u8(VERSION_PATCH);
+    fields.ledger(motion::ledger());
+    return encode(encoded, report.expected_seq, wire::MessageType::WELCOME, fields);
 }
 
 uint8_t status(uint8_t* encoded, const session::Report& report) {
-    constexpr uint8_t LENGTH = 8 + 4 + 4 + 4 * wire::JOINTS;
-    static_assert(LENGTH <= MAX_PAYLOAD, "buffer for replies");
-    FrameWriter frame(encoded, report.expected_seq, wire::MessageType::STATUS, LENGTH);
     const motion::Ledger ledger = motion::ledger();
-    frame.u8(static_cast<uint8_t>(supervisor::state()));
-    frame.u8(static_cast<uint8_t>(supervisor::fault()));
-    frame.u8(static_cast<uint8_t>(report.refusal));
-    frame.u8(report.refusal_seq);
-    frame.u8(motion::free_slots());
-    frame.u8(report.crc_errors);
-    frame.u8(hal::serial_overruns());
-    frame.u8(hal::serial_ring_full());
-    frame.u32(ledger.ticks);
-    frame.ledger(ledger);
-    return frame.finish();
+    Fields fields;
+    fields.u8(static_cast<uint8_t>(supervisor::state()));
+    fields.u8(static_cast<uint8_t>(supervisor::fault()));
+    fields.u8(static_cast<uint8_t>(report.refusal));
+    fields.u8(report.refusal_seq);
+    fields.u8(motion::free_slots());
+    fields.u8(report.crc_errors);
+    fields.u8(hal::serial_overruns());
+    fields.u8(hal::serial_ring_full());
+    fields.u32(ledger.ticks);
+    fields.ledger(ledger);
+    return encode(encoded, report.expected_seq, wire::MessageType::STATUS, fields);
 }
 
 }  // namespace reply

@@ -8,8 +8,8 @@
 namespace planarm {
 namespace reply {
 
-// Payload of WELCOME, the larger of the two; every byte but the delimiter may be stuffed.
-constexpr uint8_t MAX_PAYLOAD = 16 + 4 + 4 * wire::JOINTS;
+// WELCOME is the larger of the two; every byte but the delimiter may be stuffed.
+constexpr uint8_t MAX_PAYLOAD = wire::WELCOME_BYTES;
 constexpr uint8_t MAX_ENCODED = 2 * (wire::HEADER_BYTES + MAX_PAYLOAD + 2 * wire::CRC_BYTES) + 1;
 
 // Told to the host so that it sees every reset. For start-up.

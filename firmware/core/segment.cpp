@@ -4,6 +4,14 @@ namespace planarm {
 
 namespace {
 
+constexpr uint32_t LEAST_INTERVAL_Q16 = static_cast<uint32_t>(wire::MIN_INTERVAL_TICKS) << 16;
+constexpr uint32_t MOST_INTERVAL_Q16 = static_cast<uint32_t>(wire::MAX_INTERVAL_TICKS) << 16;
+
+// Not inline: on its own it is one multiplication of 16 bits, inlined the compiler widens it to 32.
+__attribute__((noinline)) uint32_t multiply_16(uint16_t a, uint16_t b) {
+    return static_cast<uint32_t>(a) * b;
+}
+
 // High 32 and low 16 bits of a 32 x 16 bit product.
 struct Product {
     uint32_t high;
@@ -11,46 +19,35 @@ struct Product {
 };
 
 Product multiply(uint32_t a, uint16_t b) {
-    const uint32_t low = static_cast<uint32_t>(static_cast<uint16_t>(a)) * b;
-    const uint32_t high = static_cast<uint32_t>(static_cast<uint16_t>(a >> 16)) * b + (low >> 16);
-    return {high, static_cast<uint16_t>(low)};
-}
-
-uint32_t last_interval_q16(const Move& move) {
-    return move.interval_q16 + static_cast<uint32_t>(move.add_q16) * static_cast<uint16_t>(move.steps - 2);
+    const uint32_t low = multiply_16(static_cast<uint16_t>(a), b);
+    const uint32_t high = multiply_16(static_cast<uint16_t>(a >> 16), b);
+    return {high + (low >> 16), static_cast<uint16_t>(low)};
 }
 
 bool interval_in_limits(uint32_t interval_q16) {
-    return interval_q16 >= static_cast<uint32_t>(wire::MIN_INTERVAL_TICKS) << 16 &&
-           interval_q16 <= static_cast<uint32_t>(wire::MAX_INTERVAL_TICKS) << 16;
+    return interval_q16 >= LEAST_INTERVAL_Q16 && interval_q16 <= MOST_INTERVAL_Q16;
 }
 
-// Intervals change by the same amount each time, so all are in their limits when the first and the last are,
-// and the way between these two did not wrap.
-bool intervals_in_limits(const Move& move) {
-    if (move.steps < 2) return true;
-    const uint32_t size =
-        move.add_q16 < 0 ? 0 - static_cast<uint32_t>(move.add_q16) : static_cast<uint32_t>(move.add_q16);
-    const Product way = multiply(size, static_cast<uint16_t>(move.steps - 2));
-    if (way.high > 0xFFFF) return false;
-    const uint32_t last = last_interval_q16(move);
-    const bool wrapped = move.add_q16 < 0 ? last > move.interval_q16 : last < move.interval_q16;
-    return !wrapped && interval_in_limits(move.interval_q16) && interval_in_limits(last);
+// The last interval of a move of two steps or more; false when it is beyond what 32 bits hold.
+bool find_last_interval(const Move& move, uint32_t& last_q16) {
+    const uint32_t add = static_cast<uint32_t>(move.add_q16);
+    const bool shrinking = move.add_q16 < 0;
+    const Product change = multiply(shrinking ? 0 - add : add, static_cast<uint16_t>(move.steps - 2));
+    if (change.high > 0xFFFF) return false;
+    const uint32_t change_q16 = (change.high << 16) | change.low;
+    last_q16 = shrinking ? move.interval_q16 - change_q16 : move.interval_q16 + change_q16;
+    return shrinking ? change_q16 <= move.interval_q16 : last_q16 >= change_q16;
 }
 
-Move read_move(Reader& reader) {
-    Move move = {};
+void read_move(Reader& reader, Move& move) {
     const uint32_t steps_dir = reader.varuint();
-    move.positive = (steps_dir & 1) != 0;
     const uint32_t steps = steps_dir >> 1;
+    move.positive = (steps_dir & 1) != 0;
     // More steps than fit are kept as too many, for check_move to refuse.
     move.steps = steps > wire::MAX_SEGMENT_STEPS ? 0xFFFF : static_cast<uint16_t>(steps);
-    if (steps >= 1) move.first_ticks = reader.varuint();
-    if (steps >= 2) {
-        move.interval_q16 = reader.varuint();
-        move.add_q16 = reader.varint();
-    }
-    return move;
+    move.first_ticks = steps >= 1 ? reader.varuint() : 0;
+    move.interval_q16 = steps >= 2 ? reader.varuint() : 0;
+    move.add_q16 = steps >= 2 ? reader.varint() : 0;
 }
 
 // Checks one joint's move and carries its rest on to the segment's end.
@@ -61,8 +58,9 @@ bool check_move(Move& move, uint32_t duration_ticks, uint32_t& rest_ticks) {
         return true;
     }
     if (move.steps > wire::MAX_SEGMENT_STEPS || move.first_ticks >= duration_ticks) return false;
-    if (!intervals_in_limits(move)) return false;
-    const uint32_t last_ticks = move.first_ticks + run_ticks(move);
+    uint32_t last_ticks;
+    if (!run_ticks(move, last_ticks)) return false;
+    last_ticks += move.first_ticks;
     if (last_ticks >= duration_ticks) return false;
 
     const uint32_t gap_ticks = rest_ticks + move.first_ticks;
@@ -75,31 +73,37 @@ bool check_move(Move& move, uint32_t duration_ticks, uint32_t& rest_ticks) {
 
 }  // namespace
 
-uint32_t run_ticks(const Move& move) {
-    if (move.steps < 2) return 0;
-    // n I + n (n - 1) / 2 A = n (first interval + last interval) / 2, an integer for n = steps - 1.
+// Intervals change by the same amount each time, so all are in their limits when the first and the last are.
+bool run_ticks(const Move& move, uint32_t& ticks) {
+    ticks = 0;
+    if (move.steps < 2) return true;
+    const uint32_t first = move.interval_q16;
+    uint32_t last;
+    if (!interval_in_limits(first) || !find_last_interval(move, last) || !interval_in_limits(last))
+        return false;
+    // n I + n (n - 1) / 2 A = n (first + last) / 2 for n = steps - 1: an integer, so with an odd sum n is
+    // even.
     const uint16_t n = static_cast<uint16_t>(move.steps - 1);
-    const Product first = multiply(move.interval_q16, n);
-    const Product last = multiply(last_interval_q16(move), n);
-    const uint16_t low = static_cast<uint16_t>(first.low + last.low);
-    return (first.high + last.high + (low < first.low ? 1 : 0)) >> 1;
+    const Product whole = multiply((first >> 1) + (last >> 1) + (first & last & 1), n);
+    const uint16_t odd_half = ((first ^ last) & 1) != 0 ? static_cast<uint16_t>(n >> 1) : 0;
+    ticks = whole.high + (static_cast<uint16_t>(whole.low + odd_half) < odd_half ? 1 : 0);
+    return true;
 }
 
-Segment read_segment(Reader& reader) {
-    Segment segment = {};
+void read_segment(Reader& reader, Segment& segment) {
     const uint32_t duration_flags = reader.varuint();
     segment.duration_ticks = duration_flags >> 1;
     segment.last = (duration_flags & 1) != 0;
-    for (Move& move : segment.moves) move = read_move(reader);
-    return segment;
+    for (Move& move : segment.moves) read_move(reader, move);
 }
 
 wire::Result check_segment(Segment& segment, Rest& rest) {
     const uint32_t duration_ticks = segment.duration_ticks;
     if (duration_ticks == 0 || duration_ticks > wire::MAX_SEGMENT_TICKS) return wire::Result::OUT_OF_RANGE;
     for (uint8_t joint = 0; joint < wire::JOINTS; ++joint) {
-        if (!check_move(segment.moves[joint], duration_ticks, rest.ticks[joint]))
+        if (!check_move(segment.moves[joint], duration_ticks, rest.ticks[joint])) {
             return wire::Result::OUT_OF_RANGE;
+        }
     }
     return wire::Result::OK;
 }

@@ -36,11 +36,12 @@ struct Rest {
 // late.
 constexpr uint16_t MAX_AHEAD_TICKS = wire::MAX_INTERVAL_TICKS;
 
-// Ticks from the first to the last step of a move whose intervals are in their limits. At most 2^31.
-uint32_t run_ticks(const Move& move);
+// Whether all intervals of a move are in their limits; if so, `ticks` are those from its first to its last
+// step.
+bool run_ticks(const Move& move, uint32_t& ticks);
 
 // Reads the fields of the next segment; `near` is left for check_segment.
-Segment read_segment(Reader& reader);
+void read_segment(Reader& reader, Segment& segment);
 
 // Checks a segment that follows after `rest`, and carries `rest` on to its end. OK or OUT_OF_RANGE.
 wire::Result check_segment(Segment& segment, Rest& rest);

@@ -102,8 +102,7 @@ bool next_segment(Result& result, uint32_t now_ticks) {
         supervisor::fail(Fault::QUEUE_MISUSE, now_ticks);
         return true;
     }
-    const Segment segment = read_segment(segments);
-    result = segments.ok() ? motion::stage(segment) : Result::MALFORMED;
+    result = motion::stage(segments);
     if (result == Result::BUSY) {
         motion::discard();
         return true;
@@ -113,7 +112,7 @@ bool next_segment(Result& result, uint32_t now_ticks) {
         return true;
     }
     if (!segments.at_end()) return false;
-    motion::commit();
+    if (!motion::commit()) result = Result::WRONG_STATE;
     return true;
 }
 

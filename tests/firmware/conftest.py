@@ -8,7 +8,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from firmware_board import NativeFirmware
+from firmware_board import EmulatedFirmware, Firmware, NativeFirmware
 
 ROOT = Path(__file__).parents[2]
 
@@ -22,3 +22,15 @@ def native_firmware(tmp_path_factory: pytest.TempPathFactory) -> NativeFirmware:
     done = subprocess.run(build, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     return NativeFirmware(out / "libplanarm_firmware.so")
+
+
+@pytest.fixture(scope="session")
+def emulated_firmware() -> EmulatedFirmware:
+    return EmulatedFirmware(ROOT / "firmware" / "release" / "uno.hex")
+
+
+@pytest.fixture(params=["native", "emulated"])
+def firmware(request: pytest.FixtureRequest) -> Firmware:
+    """Both boards, one after the other."""
+    chosen: Firmware = request.getfixturevalue(f"{request.param}_firmware")
+    return chosen

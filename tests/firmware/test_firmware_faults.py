@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import pytest
-from firmware_board import LEAD_TICKS, Board, Delays, NativeFirmware, Schedule, end_motion, run_of, segment_of
+from firmware_board import LEAD_TICKS, Board, Delays, Firmware, NativeFirmware, Schedule, end_motion, run_of, segment_of
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from planarm_wire.codec import encode
@@ -35,8 +35,8 @@ ONE = 1 << 16
 
 
 @pytest.fixture
-def board(native_firmware: NativeFirmware) -> Board:
-    board = Board(native_firmware)
+def board(firmware: Firmware) -> Board:
+    board = Board(firmware)
     board.get_ready()
     return board
 
@@ -181,15 +181,34 @@ def test_underrun(board: Board, segments: int) -> None:
 
 
 def test_segments_that_come_just_before_the_end_are_in_time(board: Board) -> None:
-    motion = end_motion([segment_of(30_000, run_of(20))] * 2)
+    motion = end_motion([segment_of(60_000, run_of(20))] * 2)
     board.ask(Segments(motion[:1]))
     board.send(Start(LEAD_TICKS))
     board.run(LEAD_TICKS + 20_000)
     board.send(Segments(motion[1:]))
-    board.run(80_000)
+    board.run(160_000)
     assert board.ask().fault is Fault.NONE
     rises = board.rises(0)
     assert [tick - rises[0] for tick in rises] == [tick - 1000 for tick, _ in Schedule.of(motion).steps[0]]
+
+
+def test_segments_that_come_too_late_end_in_an_underrun_at_the_boundary(native_firmware: NativeFirmware) -> None:
+    # 2000 ticks before the end there is no time left to prepare more: all that came in time is executed, and no more.
+    board = Board(native_firmware)
+    board.get_ready()
+    motion = [segment_of(60_000, run_of(50))] * 2
+    board.ask(Segments(tuple(motion[:1])))
+    board.send(Start(LEAD_TICKS))
+    board.run(LEAD_TICKS + 1500)
+    while board.rises(0)[-1] - board.rises(0)[0] < 49_000:
+        board.run(500)
+    board.run(6500)
+    board.send(Segments(tuple(motion[1:])))
+    board.run(200_000)
+    status = board.ask()
+    assert (status.state, status.fault, status.refusal) == (State.FAULT, Fault.UNDERRUN, Result.WRONG_STATE)
+    assert status.ledger.position_usteps == (50, 0)
+    assert status.ledger.executed_segments == 1
 
 
 @settings(max_examples=60, deadline=None)

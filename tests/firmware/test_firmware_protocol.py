@@ -7,7 +7,18 @@ import json
 from pathlib import Path
 
 import pytest
-from firmware_board import LEAD_TICKS, Board, Delays, NativeFirmware, Schedule, end_motion, run_of, segment_of
+from firmware_board import (
+    ANSWER_TICKS,
+    LEAD_TICKS,
+    Board,
+    Delays,
+    Firmware,
+    NativeFirmware,
+    Schedule,
+    end_motion,
+    run_of,
+    segment_of,
+)
 from planarm_wire.framing import encode_frame
 from planarm_wire.messages import (
     DELIMITER,
@@ -37,8 +48,8 @@ SHORT = segment_of(20_000, run_of(4), run_of(3))
 
 
 @pytest.fixture
-def board(native_firmware: NativeFirmware) -> Board:
-    return Board(native_firmware)
+def board(firmware: Firmware) -> Board:
+    return Board(firmware)
 
 
 def bring_to(board: Board, state: State) -> None:
@@ -62,7 +73,7 @@ def test_streams_of_the_golden_vectors(board: Board, vector: dict) -> None:
     line = bytes.fromhex(vector["line"])
     for at in range(0, len(line), 64):
         board.receive(line[at : at + 64])
-        board.run(60_000)
+        board.run(ANSWER_TICKS)
     gives = vector["gives"]
     good = [frame for frame in gives if "error" not in frame]
     assert board.replies
@@ -78,7 +89,7 @@ def test_streams_of_the_golden_vectors(board: Board, vector: dict) -> None:
 @pytest.mark.parametrize("vector", VECTORS["frames"], ids=lambda vector: f"{vector['message']} seq {vector['seq']}")
 def test_every_golden_frame_passes_the_checks(board: Board, vector: dict) -> None:
     board.receive(bytes.fromhex(vector["line"]))
-    board.run(60_000)
+    board.run(ANSWER_TICKS)
     assert len(board.replies) == 1
     board.hello()
     assert board.ask().crc_errors == 0
@@ -91,7 +102,7 @@ def test_bad_payloads_are_refused(board: Board, vector: dict) -> None:
     board.get_ready()
     payload = bytes.fromhex(vector["payload"])
     board.receive(encode_frame(board.seq, vector["type"], payload))
-    board.run(60_000)
+    board.run(ANSWER_TICKS)
     if vector["type"] != 1:
         board.seq = (board.seq + 1) % 256
     status = board.ask()
@@ -286,11 +297,10 @@ def test_hello_in_motion_leaves_the_motion_alone(board: Board) -> None:
 
 def test_the_end_of_a_motion_is_told_unasked(board: Board) -> None:
     board.get_ready()
-    board.ask(Segments((segment_of(50_000, run_of(3), last=True),)))
-    board.send(Start(LEAD_TICKS))
-    board.run(60_000)
+    board.ask(Segments((segment_of(2 * ANSWER_TICKS, run_of(3), last=True),)))
+    board.ask(Start(LEAD_TICKS))
     board.replies.clear()
-    board.run(60_000)
+    board.run(2 * ANSWER_TICKS)
     ((seq, status),) = board.replies
     assert isinstance(status, Status)
     assert (seq, status.state, status.ledger.executed_segments) == (board.seq, State.READY, 1)
@@ -310,6 +320,6 @@ def test_ring_full_is_counted(native_firmware: NativeFirmware) -> None:
     board = Board(native_firmware)
     board.hello()
     board.receive(bytes([0x55]) * 300 + bytes([DELIMITER]))
-    board.run(60_000)
+    board.run(ANSWER_TICKS)
     board.receive(bytes([DELIMITER]))
     assert board.ask().ring_full == 301 - 128

@@ -12,6 +12,7 @@ from firmware_board import (
     REST,
     Board,
     Delays,
+    Firmware,
     NativeFirmware,
     Schedule,
     end_motion,
@@ -130,24 +131,24 @@ def test_every_step_is_on_its_tick(
 
 
 @pytest.mark.parametrize("name", ["up", "down"])
-def test_ramp_with_fractions(native_firmware: NativeFirmware, name: str) -> None:
+def test_ramp_with_fractions(firmware: Firmware, name: str) -> None:
     # A change of an eighth of a tick a step: the fraction must be carried over 1000 steps.
     add = 8192 if name == "up" else -8192
     interval = (1000 << 16) + 12345 if name == "up" else (1200 << 16) + 12345
     move = Move(2 * 1000 + 1, 77, interval, add)
     motion = [segment_of(step_ticks(move)[-1] + 1, move, run_of(20, interval=50_000), last=True)]
-    board = Board(native_firmware)
+    board = Board(firmware)
     board.get_ready()
     assert_on_schedule(board, motion, board.stream(motion))
 
 
 @pytest.mark.parametrize("gap", [59_999, 60_000, 60_001, 65_535, 65_536, 65_537, 131_072, 1_000_000, 40_000_000])
-def test_gap_between_runs(native_firmware: NativeFirmware, gap: int) -> None:
+def test_gap_between_runs(firmware: Firmware, gap: int) -> None:
     # Around the reach of the 16-bit timer the joint goes idle and is started again.
     first = segment_of(4 * 1000 + 1, run_of(4, interval=1000))
     second = segment_of(gap + 10_000, run_of(3, first=gap - 1, interval=900, positive=False))
     motion = end_motion([first, second])
-    board = Board(native_firmware)
+    board = Board(firmware)
     board.get_ready()
     status = board.stream(motion, slice_ticks=20_000)
     assert_on_schedule(board, motion, status)
@@ -155,19 +156,19 @@ def test_gap_between_runs(native_firmware: NativeFirmware, gap: int) -> None:
     assert rises[4] - rises[3] == gap
 
 
-def test_reversal_at_the_least_interval(native_firmware: NativeFirmware) -> None:
+def test_reversal_at_the_least_interval(firmware: Firmware) -> None:
     there_and_back = [
         segment_of(8 * 800, *[run_of(8, first=0, interval=800, positive=i % 2 == 0)] * 2) for i in range(12)
     ]
     motion = end_motion(there_and_back)
-    board = Board(native_firmware)
+    board = Board(firmware)
     board.get_ready()
     assert_on_schedule(board, motion, board.stream(motion))
 
 
-def test_two_motions_add_up(native_firmware: NativeFirmware) -> None:
+def test_two_motions_add_up(firmware: Firmware) -> None:
     motion = end_motion([segment_of(30_000, run_of(10), run_of(5, positive=False))])
-    board = Board(native_firmware)
+    board = Board(firmware)
     board.get_ready()
     first = board.stream(motion)
     board.edges = [edge for edge in board.edges if edge.pin in DIR_PINS]

@@ -1,0 +1,208 @@
+"""The released image on the emulated Uno: what only the chip can show. Start-up, boot count, speed with a busy line."""
+
+from __future__ import annotations
+
+from collections import deque
+from pathlib import Path
+
+import pytest
+from firmware_board import (
+    LEAD_TICKS,
+    Board,
+    EmulatedFirmware,
+    Schedule,
+    end_motion,
+    run_of,
+    segment_of,
+)
+from planarm_sim import Uno
+from planarm_wire.codec import decode, encode
+from planarm_wire.framing import Frame, FrameDecoder, encode_frame
+from planarm_wire.messages import (
+    BAUD,
+    DIR_PINS,
+    ENABLE_PIN,
+    HOST_WINDOW_BYTES,
+    MIN_INTERVAL_TICKS,
+    MIN_STEP_HIGH_TICKS,
+    MIN_STEP_LOW_TICKS,
+    PROTOCOL_VERSION,
+    QUEUE_SLOTS,
+    STEP_PINS,
+    Fault,
+    Hello,
+    Query,
+    Segment,
+    Segments,
+    Start,
+    State,
+    Status,
+    Welcome,
+)
+
+IMAGE = Path(__file__).parents[2] / "firmware" / "release" / "uno.hex"
+RESET_TO_PINS_CYCLES = 16  # 1 us
+BOOT_CYCLES = 400_000
+
+
+def boot_nonce(uno: Uno) -> int:
+    """The nonce of a board that has just booted."""
+    uno.serial.write(encode_frame(0, *encode(Hello(PROTOCOL_VERSION, 1))))
+    uno.run(cycles=100_000)
+    (frame,) = FrameDecoder().feed(uno.serial.read())
+    assert isinstance(frame, Frame)
+    welcome = decode(frame.type_code, frame.payload)
+    assert isinstance(welcome, Welcome)
+    return welcome.boot_nonce
+
+
+def test_drivers_are_released_at_once_and_nothing_else_moves() -> None:
+    uno = Uno.from_hex(IMAGE, baud=BAUD)
+    uno.run(cycles=RESET_TO_PINS_CYCLES)
+    assert uno.pin(ENABLE_PIN).level == 1
+    uno.run(cycles=BOOT_CYCLES)
+    assert uno.pin(ENABLE_PIN).level == 1
+    assert [len(uno.edges(pin)) for pin in (ENABLE_PIN, *STEP_PINS, *DIR_PINS)] == [0] * 5
+
+
+def test_every_reset_gives_another_nonce() -> None:
+    uno = Uno.from_hex(IMAGE, baud=BAUD)
+    uno.run(cycles=BOOT_CYCLES)
+    nonces = [boot_nonce(uno)]
+    for _ in range(20):
+        uno.reset()
+        uno.run(cycles=BOOT_CYCLES)
+        nonces.append(boot_nonce(uno))
+    assert len(set(nonces)) == len(nonces)
+
+
+def test_a_reset_while_the_count_is_written_repeats_no_nonce() -> None:
+    # The count goes to EEPROM for about 3.4 ms; a reset at any moment of it must not bring an old nonce back.
+    uno = Uno.from_hex(IMAGE, baud=BAUD)
+    uno.run(cycles=BOOT_CYCLES)
+    seen = [boot_nonce(uno)]
+    for moment in range(1000, 70_000, 6_900):
+        uno.reset()
+        uno.run(cycles=moment)
+        uno.reset()
+        uno.run(cycles=BOOT_CYCLES)
+        seen.append(boot_nonce(uno))
+    assert len(set(seen)) == len(seen)
+
+
+def test_reset_in_motion_releases_the_drivers_and_forgets_the_motion(emulated_firmware: EmulatedFirmware) -> None:
+    board = Board(emulated_firmware)
+    board.get_ready()
+    board.ask(Segments((segment_of(1_000_000, run_of(900)),)))
+    board.send(Start(LEAD_TICKS))
+    board.run(100_000)
+    uno = emulated_firmware.uno
+    uno.reset()
+    board.edges.clear()
+    board.run(BOOT_CYCLES)
+    assert uno.pin(ENABLE_PIN).level == 1
+    assert not any(edge.level for edge in board.motion_edges())
+    board.hello()
+    status = board.ask()
+    assert (status.state, status.ledger.position_usteps) == (State.IDLE, (0, 0))
+
+
+class Streamer:
+    """Sends a motion as a host does: a window of unacknowledged bytes, the line never idle while it has room."""
+
+    def __init__(self, board: Board, segments: list[Segment], busy_line: bool) -> None:
+        self.board = board
+        self.waiting = deque(segments)
+        self.busy_line = busy_line
+        self.in_flight: deque[tuple[int, int]] = deque()
+        self.last: Status | None = None
+        board.replies.clear()
+
+    def run(self, until_segments: int, limit_ticks: int) -> Status:
+        """Stream until so many segments are executed or a fault is latched."""
+        end = self.board.now + limit_ticks
+        while self.board.now < end:
+            self.top_up()
+            self.board.run(2000)
+            while self.board.replies:
+                self.take_reply(*self.board.replies.popleft())
+            if self.last and (
+                self.last.fault is not Fault.NONE or self.last.ledger.executed_segments >= until_segments
+            ):
+                return self.last
+        raise AssertionError(f"not done after {limit_ticks} ticks: {self.last}")
+
+    def take_reply(self, acknowledged: int, reply: object) -> None:
+        assert isinstance(reply, Status)
+        self.last = reply
+        while self.in_flight and (acknowledged - self.in_flight[0][0] - 1) % 256 < 128:
+            self.in_flight.popleft()
+
+    def top_up(self) -> None:
+        free = QUEUE_SLOTS if self.last is None else self.last.free_slots
+        queued = sum(1 for _, size in self.in_flight if size > 8)
+        while True:
+            has_slot = self.waiting and queued < free
+            if not has_slot and not self.busy_line:
+                return
+            message = Segments((self.waiting[0],)) if has_slot else Query()
+            frame = encode_frame(self.board.seq, *encode(message))
+            if sum(size for _, size in self.in_flight) + len(frame) > HOST_WINDOW_BYTES:
+                return
+            self.in_flight.append((self.board.seq, len(frame)))
+            self.board.seq = (self.board.seq + 1) % 256
+            self.board.receive(frame)
+            if has_slot:
+                self.waiting.popleft()
+                queued += 1
+
+
+@pytest.mark.parametrize("busy_line", [False, True], ids=["line as needed", "line saturated"])
+@pytest.mark.parametrize("ratio", [1.0, 1.618])
+def test_full_rate_with_both_joints(emulated_firmware: EmulatedFirmware, busy_line: bool, ratio: float) -> None:
+    # Both joints at the least interval, turning round at every boundary, streamed while they move.
+    slow = round(MIN_INTERVAL_TICKS * ratio)
+    count, duration = 60, 32_000
+    motion = end_motion(
+        [
+            segment_of(
+                duration,
+                run_of(duration // MIN_INTERVAL_TICKS, first=0, interval=MIN_INTERVAL_TICKS, positive=i % 2 == 0),
+                run_of((duration - 7) // slow, first=7, interval=slow, positive=i % 3 == 0),
+            )
+            for i in range(count)
+        ]
+    )
+    board = Board(emulated_firmware)
+    board.get_ready()
+    for segment in motion[:16]:
+        board.ask(Segments((segment,)))
+    board.ask(Start(LEAD_TICKS))
+    status = Streamer(board, motion[16:], busy_line).run(count, 4_000_000)
+    assert (status.fault, status.ring_full, status.overruns, status.crc_errors) == (Fault.NONE, 0, 0, 0)
+    schedule = Schedule.of(motion)
+    begin = board.rises(0)[0]
+    for joint in range(2):
+        assert board.rises(joint) == [begin + tick for tick, _ in schedule.steps[joint]]
+        edges = [edge for edge in board.edges if edge.pin == STEP_PINS[joint]]
+        highs = [fall.tick - rise.tick for rise, fall in zip(edges[::2], edges[1::2], strict=True)]
+        lows = [rise.tick - fall.tick for fall, rise in zip(edges[1::2], edges[2::2], strict=False)]
+        assert min(highs) >= MIN_STEP_HIGH_TICKS
+        assert min(lows) >= MIN_STEP_LOW_TICKS
+    assert status.ledger.position_usteps == schedule.positions()
+
+
+def test_more_bytes_than_the_ring_holds_are_counted_and_harmless(emulated_firmware: EmulatedFirmware) -> None:
+    # No window kept, no delimiter: the steps go on, and what is lost is told.
+    motion = end_motion([segment_of(800_000, run_of(999, interval=800), run_of(999, interval=800))])
+    board = Board(emulated_firmware)
+    board.get_ready()
+    board.ask(Segments(tuple(motion)))
+    board.ask(Start(LEAD_TICKS))
+    board.receive(bytes(range(256)) * 4)
+    board.run(1_200_000)
+    status = board.ask()
+    assert status.fault is Fault.NONE
+    assert status.crc_errors > 0
+    rises = board.rises(0)
+    assert [tick - rises[0] for tick in rises] == [800 * i for i in range(999)]
