@@ -4,6 +4,7 @@
 
     PlanarmError
     ├── SceneError        2  the scene file, or a value given in its place, is wrong
+    ├── EmulatorError     2  the emulator cannot start: image, link or file
     ├── NoPathError       3  start and goal are fine, but no collision-free path joins them
     ├── TimingError       4  the path cannot be timed within the joints' limits
     ├── CertificateError  4  a check of the finished plan failed
@@ -37,6 +38,12 @@ class SceneError(PlanarmError):
         self.source = source
         self.key = key
         self.problem = problem
+
+
+class EmulatorError(PlanarmError):
+    """The emulator cannot start: a bad flash image, a link or a file that cannot be made."""
+
+    exit_code: ClassVar[int] = 2
 
 
 class NoPathError(PlanarmError):

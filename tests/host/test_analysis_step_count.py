@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+
 from planarm.analysis.step_count import MeasuredSteps, Waveform, compare_steps, measure_steps
 
 HIGH_TICKS = 48

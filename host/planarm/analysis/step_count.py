@@ -77,6 +77,14 @@ class StepComparison:
         """True when exactly the planned steps were made, each in its direction."""
         return self.steps_planned == self.steps_at_pins and self.directions_agree
 
+    def explain(self) -> str:
+        """Say in a sentence how pins and plan compare."""
+        if self.steps_planned != self.steps_at_pins:
+            return f"the pins show {self.steps_at_pins} steps, the plan has {self.steps_planned}"
+        if not self.directions_agree:
+            return f"the pins show {self.steps_at_pins} steps as planned, but some in the wrong direction"
+        return f"the pins show the planned steps, within {self.max_timing_error_ticks} ticks"
+
 
 def measure_steps(step: Waveform, direction: Waveform) -> MeasuredSteps:
     """Read one joint's steps and pulse widths from its STEP and DIR waveforms."""

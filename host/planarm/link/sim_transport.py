@@ -9,7 +9,7 @@ import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from planarm_wire.messages import BAUD, TICKS_HZ
+from planarm_wire.messages import BAUD, DIR_PINS, ENABLE_PIN, STEP_PINS, TICKS_HZ
 
 from planarm.errors import LinkError
 from planarm.link.clock import Clock
@@ -37,24 +37,24 @@ class EmulatorClock:
 
 
 class SimTransport:
-    """A line to an Uno emulated from a flash image; `pins` shows its edges."""
+    """A line to an Uno emulated from a flash image; `pins` shows its edges, `uno` is the board itself."""
 
     def __init__(self, image: str | Path, baud: int = BAUD) -> None:
         from planarm_sim import SimError, Uno  # noqa: PLC0415 - brings Numba, which only emulation needs
 
         try:
-            self._uno = Uno.from_hex(image, baud=baud)
+            self.uno = Uno.from_hex(image, baud=baud)
         except (SimError, OSError) as error:
             raise LinkError(f"port sim://: {error}") from error
-        self.clock: Clock = EmulatorClock(self._uno)
-        self.pins = EmulatorPins(self._uno)
+        self.clock: Clock = EmulatorClock(self.uno)
+        self.pins = EmulatorPins(self.uno)
         self._received = bytearray()
         self._open = True
 
     def read(self, max_bytes: int, deadline_s: float) -> bytes:
         """Run the board until it has sent a byte or its time is `deadline_s`; return at most `max_bytes` bytes."""
         self._check_open("read")
-        uno = self._uno
+        uno = self.uno
         self._received += uno.serial.read()
         while not self._received and uno.cycle / TICKS_HZ < deadline_s:
             _run(uno, min(uno.cycle + SLICE_CYCLES, _first_cycle(deadline_s)))
@@ -66,7 +66,7 @@ class SimTransport:
     def write(self, data: bytes) -> None:
         """Put `data` on the line; it reaches the chip byte by byte as time passes."""
         self._check_open("write")
-        self._uno.serial.write(data)
+        self.uno.serial.write(data)
 
     def close(self) -> None:
         """Stop using the board; its pins stay readable."""
@@ -86,6 +86,10 @@ class EmulatorPins:
     def edges(self, pin: str) -> "NDArray[Any]":
         """Edges of `pin` since power-up, as a structured array (cycle int64, level uint8)."""
         return self._uno.edges(pin)
+
+    def write_vcd(self, path: Path) -> None:
+        """Write the waveforms of STEP, DIR and ENABLE pins since power-up to a VCD file."""
+        self._uno.write_vcd(path, (*STEP_PINS, *DIR_PINS, ENABLE_PIN))
 
 
 def _first_cycle(t_s: float) -> float:

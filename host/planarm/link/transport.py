@@ -9,6 +9,7 @@
 ==============================  =====================================================================
 """
 
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 from urllib.parse import parse_qs, urlsplit
 
@@ -29,6 +30,10 @@ class PinTrace(Protocol):
 
     def edges(self, pin: str) -> "NDArray[Any]":
         """Edges of one pin, such as "D9", as a structured array (cycle int64 at 16 MHz, level uint8)."""
+        ...
+
+    def write_vcd(self, path: Path) -> None:
+        """Write the waveforms of the pins that matter to a driver (STEP, DIR, ENABLE) to a VCD file."""
         ...
 
 

@@ -1,0 +1,39 @@
+"""`planarm emulate`: a flash image on the emulated Uno, behind a virtual serial port."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from dataclasses import asdict
+
+from planarm.cli.scenes import tell_first_compile
+from planarm.errors import DeviceFault, EmulatorError
+from planarm.link.released_image import released_image
+
+
+def execute(options: argparse.Namespace) -> int:
+    """Emulate until stopped; the pty's path is printed first, on stderr when --json keeps stdout for the result."""
+    tell_first_compile("planarm_sim")
+    from planarm_sim.__main__ import summary
+    from planarm_sim.emulate import emulate
+    from planarm_sim.errors import SimError
+
+    talk = sys.stderr if options.json else sys.stdout
+    try:
+        result = emulate(
+            options.firmware or released_image(),
+            link=options.link,
+            vcd=options.vcd,
+            speed=options.speed,
+            announce=lambda path: print(path, file=talk, flush=True),
+            say=lambda text: print(f"note: {text}", file=sys.stderr, flush=True),
+        )
+    except SimError as error:
+        raise EmulatorError(str(error)) from error
+    for warning in result.warnings:
+        print(f"note: {warning}", file=sys.stderr)
+    print(json.dumps(asdict(result)) if options.json else summary(result))
+    if result.program_failed:
+        raise DeviceFault(result.ended)
+    return 0

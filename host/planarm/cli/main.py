@@ -1,0 +1,110 @@
+"""`planarm`: one parser, one file a command."""
+
+from __future__ import annotations
+
+import argparse
+import importlib
+import json
+import sys
+from collections.abc import Sequence
+
+import planarm
+from planarm.errors import PlanarmError
+
+EXIT_CODES = """exit codes:
+  0 ok    2 bad input    3 no path    4 cannot be timed or certified
+  5 link    6 device fault    7 executed steps differ from the plan"""
+
+PLANNERS = ("a_star", "modified_a_star", "chaos_a_star", "chs")
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Run one command and leave with its exit code."""
+    options = build_parser().parse_args(arguments)
+    command = importlib.import_module(f"planarm.cli.{options.command}")
+    try:
+        code = command.execute(options)
+    except PlanarmError as error:
+        report_error(error, as_json=options.json)
+        code = error.exit_code
+    except KeyboardInterrupt:
+        print("stopped by the keyboard", file=sys.stderr)
+        code = 130
+    sys.exit(code)
+
+
+def build_parser() -> argparse.ArgumentParser:
+    """Return the whole command line's parser."""
+    parser = argparse.ArgumentParser(
+        prog="planarm",
+        description="From a scene file to proven step pulses on an Arduino Uno.",
+        epilog=EXIT_CODES,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("--version", action="version", version=f"planarm {planarm.__version__}")
+    commands = parser.add_subparsers(dest="command", metavar="COMMAND", required=True)
+    _add_plan(commands)
+    _add_run(commands)
+    _add_stream(commands)
+    _add_emulate(commands)
+    return parser
+
+
+def report_error(error: PlanarmError, as_json: bool) -> None:
+    """Print the error where its reader looks: one JSON object on stdout, or a sentence on stderr."""
+    if as_json:
+        told = {"kind": type(error).__name__, "message": str(error), "exit_code": error.exit_code}
+        print(json.dumps({"error": told}))
+    else:
+        print(f"planarm: {error}", file=sys.stderr)
+
+
+Commands = argparse._SubParsersAction
+
+
+def _add_plan(commands: Commands[argparse.ArgumentParser]) -> None:
+    command = commands.add_parser("plan", help="plan a scene and write the certified plan", epilog=EXIT_CODES)
+    _add_scene(command)
+    command.add_argument("-o", "--output", metavar="FILE.plan", required=True, help="where to write the plan")
+    _add_json(command)
+
+
+def _add_run(commands: Commands[argparse.ArgumentParser]) -> None:
+    command = commands.add_parser("run", help="plan, stream, verify and report", epilog=EXIT_CODES)
+    _add_scene(command)
+    _add_port(command)
+    command.add_argument("--out", metavar="DIR", help="folder for plan, trace, summary and pictures")
+    _add_json(command)
+
+
+def _add_stream(commands: Commands[argparse.ArgumentParser]) -> None:
+    command = commands.add_parser("stream", help="stream a certified plan", epilog=EXIT_CODES)
+    command.add_argument("plan", metavar="FILE.plan")
+    _add_port(command)
+    _add_json(command)
+
+
+def _add_emulate(commands: Commands[argparse.ArgumentParser]) -> None:
+    command = commands.add_parser("emulate", help="run a flash image on the emulated Uno behind a virtual serial port")
+    command.add_argument("--firmware", metavar="HEX|ELF", help="the image to run (default: the released firmware)")
+    command.add_argument("--link", metavar="PATH", help="make PATH a link to the pty")
+    command.add_argument("--vcd", metavar="FILE", help="write the pins' edges to FILE at the end")
+    command.add_argument("--speed", choices=("real", "max"), default="real", help="pace of the chip's clock")
+    _add_json(command)
+
+
+def _add_scene(command: argparse.ArgumentParser) -> None:
+    command.add_argument("scene", metavar="SCENE", help="scene file (TOML); see docs/scene.md")
+    command.add_argument("--planner", choices=PLANNERS, help="overrides the scene's algorithm")
+    command.add_argument("--neighbours", type=int, metavar="N", help="overrides the scene's neighbourhood")
+    command.add_argument("--seed", type=int, metavar="N", help="overrides the scene's seed (Chaos A*)")
+
+
+def _add_port(command: argparse.ArgumentParser) -> None:
+    command.add_argument(
+        "--port", metavar="URL", help="sim:// (the emulator in this process), a device or pty path, a pyserial URL"
+    )
+
+
+def _add_json(command: argparse.ArgumentParser) -> None:
+    command.add_argument("--json", action="store_true", help="print one JSON object and nothing else on stdout")

@@ -1,0 +1,36 @@
+"""`planarm run SCENE`: plan, stream, verify, report."""
+
+from __future__ import annotations
+
+import argparse
+import json
+from pathlib import Path
+
+from planarm.cli.progress import progress
+from planarm.cli.scenes import chosen_scene, tell_first_compile
+
+
+def execute(options: argparse.Namespace) -> int:
+    """Run the whole flow and print its summary."""
+    scene = chosen_scene(options)
+    tell_first_compile("planarm", "planarm_sim")
+    from planarm.pipeline import run_scene
+
+    out = Path(options.out or Path("out") / f"{Path(scene.source).stem}-{scene.planner.algorithm}")
+    with progress(options.json) as notice:
+        summary = run_scene(scene, options.port or scene.link.port, out, notice)
+    if options.json:
+        print(json.dumps(summary))
+    else:
+        _print(summary, out)
+    return 0
+
+
+def _print(summary: dict[str, object], out: Path) -> None:
+    from rich.console import Console
+
+    from planarm.report import summary_table
+
+    console = Console()
+    console.print(summary_table(summary))
+    console.print(f"plan, trace, summary and pictures: {out}")

@@ -1,0 +1,26 @@
+"""The scene that a command names, with the command line's overrides."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+
+from planarm.scene import Scene, load_scene, with_planner
+from planarm_wire.kernel_cache import is_cold
+
+
+def chosen_scene(options: argparse.Namespace) -> Scene:
+    """Read the scene and put the overrides in.
+
+    Raises:
+        SceneError: The scene, or an override, is wrong.
+    """
+    scene = load_scene(Path(options.scene))
+    return with_planner(scene, algorithm=options.planner, neighbours=options.neighbours, seed=options.seed)
+
+
+def tell_first_compile(*packages: str) -> None:
+    """Say why the first run takes longer, before it does."""
+    if any(is_cold(package) for package in packages):
+        print("Compiling the numeric kernels, once a version: about a minute ...", file=sys.stderr)

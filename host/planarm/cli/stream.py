@@ -1,0 +1,30 @@
+"""`planarm stream FILE.plan --port URL`."""
+
+from __future__ import annotations
+
+import argparse
+import json
+from contextlib import closing
+from pathlib import Path
+
+from planarm.cli.progress import progress
+from planarm.cli.scenes import tell_first_compile
+
+
+def execute(options: argparse.Namespace) -> int:
+    """Stream a certified plan and tell what the device executed."""
+    tell_first_compile("planarm", "planarm_sim")
+    from planarm.link.position import moved_usteps
+    from planarm.link.transport import open_transport
+    from planarm.pipeline import stream
+    from planarm.plan_file import load_plan
+
+    plan = load_plan(Path(options.plan))
+    link = plan.scene["link"]
+    port = options.port or link["port"]
+    with progress(options.json) as notice, closing(open_transport(port, link["baud"])) as transport:
+        result = stream(plan.segments, plan.certificate, transport, notice)
+    moved = moved_usteps(result.ledger_before, result.ledger_after)
+    told = {"moved_usteps": list(moved), "retransmissions": result.retransmissions}
+    print(json.dumps(told) if options.json else f"executed {told['moved_usteps']} micro-steps")
+    return 0

@@ -1,0 +1,165 @@
+"""The whole flow as one readable function: from a scene file to counted steps at the pins.
+
+scene -> FreeMap -> Path -> SmoothPath -> Trajectory -> StepTrain -> SegmentPlan -> frames -> pins -> edges -> findings
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from contextlib import closing
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from planarm.analysis.step_count import MeasuredSteps, StepComparison, Waveform, compare_steps, measure_steps
+from planarm.errors import CertificateError, NoPathError, StepsDifferError
+from planarm.link.exchange import StreamResult, stream_plan
+from planarm.link.transport import PinTrace, Transport, open_transport
+from planarm.model.arm import Arm
+from planarm.plan_file import StoredPlan
+from planarm.run_folder import write_run_folder
+from planarm.scene import Scene
+from planarm.search.grid_search import find_path
+from planarm.search.path import Path as TipPath
+from planarm.smoothing.blend import SmoothPath, blend_corners
+from planarm.stepping.certify import Certificate, certify
+from planarm.stepping.quantise import StepTrain, quantisation_bound_cm, quantise
+from planarm.stepping.segments import SegmentPlan, compress, expand
+from planarm.summary import summarise
+from planarm.trajectory.timing import Trajectory, time_path
+from planarm.workspace.check_task import check_task
+from planarm.workspace.free_map import FreeMap, build_free_map
+from planarm_wire.messages import DIR_PINS, STEP_PINS
+
+Notice = Callable[[str, float], None]
+"""Told the stage and the share of it that is done."""
+
+
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """Everything from a scene to certified segments, each stage's value kept for the report."""
+
+    scene: Scene
+    free_map: FreeMap
+    path: TipPath
+    smooth_path: SmoothPath
+    trajectory: Trajectory
+    train: StepTrain
+    segments: SegmentPlan
+    certificate: Certificate
+    plan_ms: float
+    """Wall time of the whole planning, certificate included."""
+    search_ms: float
+    """Wall time of the grid search alone."""
+
+
+@dataclass(frozen=True, slots=True)
+class Findings:
+    """What the pins showed, held against the plan."""
+
+    measured: tuple[MeasuredSteps, ...]
+    comparison: StepComparison
+
+
+def plan_scene(scene: Scene, notice: Notice) -> Plan:
+    """Plan, time, quantise, compress and certify.
+
+    Raises:
+        SceneError: Start or goal cannot be taken.
+        NoPathError: Nothing joins them; the message says why.
+        TimingError: A joint would have to step faster than the firmware can.
+    """
+    began_s = time.perf_counter()
+    notice("plan", 0.0)
+    arm = Arm.from_spec(scene.arm)
+    free_map = build_free_map(scene, scene.margin_cm + quantisation_bound_cm(arm, scene.joints))
+    check_task(scene, free_map)
+    notice("plan", 0.2)
+    found = find_path(free_map, scene.task.start_cm, scene.task.goal_cm, scene.planner)
+    if found.path is None:
+        raise NoPathError(f"{scene.source}: {found.reason}")
+    notice("plan", 0.4)
+    smooth_path = blend_corners(found.path, free_map)
+    trajectory = time_path(smooth_path, scene.joints)
+    notice("plan", 0.6)
+    train = quantise(trajectory, scene.joints)
+    segments = compress(train)
+    notice("plan", 0.8)
+    certificate = certify(scene, trajectory, train, segments)
+    notice("plan", 1.0)
+    return Plan(
+        scene,
+        free_map,
+        found.path,
+        smooth_path,
+        trajectory,
+        train,
+        segments,
+        certificate,
+        plan_ms=1e3 * (time.perf_counter() - began_s),
+        search_ms=1e3 * found.plan_s,
+    )
+
+
+def stored(plan: Plan) -> StoredPlan:
+    """The plan in the form of a plan file."""
+    return StoredPlan(
+        scene=asdict(plan.scene),
+        path_points_cm=tuple((float(x), float(y)) for x, y in plan.path.points_cm),
+        motion_s=plan.trajectory.duration_s,
+        segments=plan.segments,
+        certificate=plan.certificate,
+    )
+
+
+def run_scene(scene: Scene, port: str, out: Path, notice: Notice) -> dict[str, Any]:
+    """Plan, stream, verify and report; return the summary.
+
+    Args:
+        scene: what to do.
+        port: where the firmware is: sim://, a device or pty path, or a pyserial URL.
+        out: folder for plan, trace, summary and pictures.
+        notice: told the progress.
+
+    Raises:
+        PlanarmError: the branch of the tree tells which stage failed. Differing steps are reported first, then raised.
+    """
+    plan = plan_scene(scene, notice)
+    with closing(open_transport(port, scene.link.baud)) as transport:
+        streamed = stream(plan.segments, plan.certificate, transport, notice)
+        findings = judge_pins(plan.segments, transport.pins) if transport.pins else None
+    summary = summarise(plan, streamed, findings)
+    write_run_folder(out, plan, stored(plan), summary, transport.pins)
+    if findings and not findings.comparison.agrees:
+        raise StepsDifferError(f"{scene.source}: {findings.comparison.explain()}; see {out}")
+    return summary
+
+
+def stream(plan: SegmentPlan, certificate: Certificate, transport: Transport, notice: Notice) -> StreamResult:
+    """Stream a certified plan and wait until the device has executed it.
+
+    Raises:
+        CertificateError: The certificate is red; nothing is sent.
+        LinkError: The line or its protocol failed.
+        DeviceFault: The firmware latched a fault.
+        StepsDifferError: The device's ledger is not the plan.
+    """
+    if not certificate.ok:
+        raise CertificateError(certificate.explain())
+    return stream_plan(transport, plan.segments, lambda told: notice("stream", told.path_s / told.total_s))
+
+
+def judge_pins(plan: SegmentPlan, trace: PinTrace) -> Findings:
+    """Count the steps from the pins' edges and hold them against the plan."""
+    measured = tuple(
+        measure_steps(_waveform(trace, step), _waveform(trace, direction))
+        for step, direction in zip(STEP_PINS, DIR_PINS, strict=True)
+    )
+    planned = [(joint.ticks, joint.directions) for joint in expand(plan).steps]
+    return Findings(measured, compare_steps(planned, measured))
+
+
+def _waveform(trace: PinTrace, pin: str) -> Waveform:
+    edges = trace.edges(pin)
+    return Waveform(edges["cycle"], edges["level"])

@@ -1,0 +1,116 @@
+"""Plan files: everything `stream` needs, and what a person wants to know, as one JSON object with a hash.
+
+See docs/decisions/0006. The numbers that the firmware executes are integers; the SHA-256 covers every other key.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import planarm
+from planarm.errors import CertificateError
+from planarm.stepping.certify import Certificate, Check
+from planarm.stepping.segments import SegmentPlan
+from planarm_wire.messages import SPEC_HASH, Move, Segment
+
+FORMAT = 1
+
+
+@dataclass(frozen=True, slots=True)
+class StoredPlan:
+    """A plan as a file holds it.
+
+    Attributes:
+        scene: The scene as planned, in the units of `planarm.scene`.
+        path_points_cm: Way-points of the end effector.
+        motion_s: Planned duration.
+        segments: What is streamed, with the start on the micro-step lattice.
+        certificate: The checks that it passed, or did not.
+    """
+
+    scene: Mapping[str, Any]
+    path_points_cm: tuple[tuple[float, float], ...]
+    motion_s: float
+    segments: SegmentPlan
+    certificate: Certificate
+
+
+def save_plan(plan: StoredPlan, path: Path) -> None:
+    """Write the plan to `path`."""
+    body = _to_json(plan)
+    body["sha256"] = _digest(body)
+    path.write_text(json.dumps(body, indent=1) + "\n", encoding="utf-8")
+
+
+def load_plan(path: Path) -> StoredPlan:
+    """Read a plan.
+
+    Raises:
+        CertificateError: The file is missing, damaged, of another format, or made for another wire.
+    """
+    try:
+        body = json.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise CertificateError(f"{path}: cannot be read: {error.strerror}") from error
+    except ValueError as error:
+        raise CertificateError(f"{path}: is no plan: {error}; make one with 'planarm plan'") from error
+    if not isinstance(body, dict) or body.get("format") != FORMAT:
+        raise CertificateError(f"{path}: is no plan of format {FORMAT}; make it anew with 'planarm plan'")
+    if body.pop("sha256", None) != _digest(body):
+        raise CertificateError(f"{path}: was changed after it was made (its SHA-256 differs); make it anew")
+    if body["spec_hash"] != SPEC_HASH:
+        raise CertificateError(
+            f"{path}: was made for wire {body['spec_hash']:08x}, this planarm speaks {SPEC_HASH:08x}; make it anew"
+        )
+    return _from_json(body)
+
+
+def _to_json(plan: StoredPlan) -> dict[str, Any]:
+    return {
+        "format": FORMAT,
+        "planarm": planarm.__version__,
+        "spec_hash": SPEC_HASH,
+        "scene": plan.scene,
+        "path_points_cm": plan.path_points_cm,
+        "motion_s": plan.motion_s,
+        "start_usteps": plan.segments.start_usteps,
+        "duration_ticks": plan.segments.duration_ticks,
+        "segments": [_segment_to_json(segment) for segment in plan.segments.segments],
+        "certificate": [
+            {name: getattr(check, name) for name in Check.__dataclass_fields__} for check in plan.certificate.checks
+        ],
+    }
+
+
+def _from_json(body: Mapping[str, Any]) -> StoredPlan:
+    segments = SegmentPlan(
+        segments=tuple(_segment_from_json(row) for row in body["segments"]),
+        duration_ticks=body["duration_ticks"],
+        start_usteps=tuple(body["start_usteps"]),
+    )
+    return StoredPlan(
+        scene=body["scene"],
+        path_points_cm=tuple((x, y) for x, y in body["path_points_cm"]),
+        motion_s=body["motion_s"],
+        segments=segments,
+        certificate=Certificate(tuple(Check(**row) for row in body["certificate"])),
+    )
+
+
+def _segment_to_json(segment: Segment) -> list[Any]:
+    moves = [[m.steps_dir, m.first_ticks, m.interval_q16, m.add_q16] for m in segment.moves]
+    return [segment.duration_flags, moves]
+
+
+def _segment_from_json(row: list[Any]) -> Segment:
+    duration_flags, moves = row
+    return Segment(duration_flags, tuple(Move(*move) for move in moves))
+
+
+def _digest(body: Mapping[str, Any]) -> str:
+    return hashlib.sha256(json.dumps(body, sort_keys=True, separators=(",", ":")).encode()).hexdigest()

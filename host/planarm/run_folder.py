@@ -1,0 +1,77 @@
+"""A run's folder: the plan, the trace, the summary and the pictures."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from planarm.model.arm import Arm
+from planarm.model.kinematics import forward
+from planarm.model.shapes import shape_of
+from planarm.plan_file import StoredPlan, save_plan
+from planarm.report import draw_joint_angles, draw_step_rates, draw_workspace
+from planarm_wire.messages import MIN_INTERVAL_TICKS, TICKS_HZ
+
+if TYPE_CHECKING:
+    from planarm.link.transport import PinTrace
+    from planarm.pipeline import Plan
+
+POSES_SHOWN = 7
+CURVE_POINTS = 600
+
+
+def write_run_folder(
+    out: Path, plan: Plan, stored: StoredPlan, summary: Mapping[str, Any], trace: PinTrace | None
+) -> list[Path]:
+    """Write everything a person or a program wants to keep of a run, and return the files.
+
+    Args:
+        out: the folder, made when missing; files of an earlier run in it are overwritten.
+        plan: the plan with its stages.
+        stored: the same in the form of a plan file.
+        summary: the run's figures.
+        trace: the emulated board's pins; None leaves out trace.vcd.
+    """
+    out.mkdir(parents=True, exist_ok=True)
+    files = [out / name for name in ("run.plan", "summary.json", "workspace.png", "joint_angles.png", "step_rates.png")]
+    save_plan(stored, files[0])
+    files[1].write_text(json.dumps(summary, indent=1) + "\n", encoding="utf-8")
+    _draw(plan, *files[2:])
+    if trace is not None:
+        trace.write_vcd(out / "trace.vcd")
+        files.append(out / "trace.vcd")
+    return files
+
+
+def _draw(plan: Plan, workspace: Path, joint_angles: Path, step_rates: Path) -> None:
+
+    scene, trajectory = plan.scene, plan.trajectory
+    arm = Arm.from_spec(scene.arm)
+    t_s = np.linspace(0.0, trajectory.duration_s, CURVE_POINTS)
+    q_rad = trajectory.sample(t_s)[0]
+    shown = np.linspace(0, len(t_s) - 1, POSES_SHOWN).round().astype(int)
+    draw_workspace(
+        workspace,
+        x_cm=plan.free_map.x_cm,
+        y_cm=plan.free_map.y_cm,
+        region=plan.free_map.region,
+        obstacles=[shape_of(obstacle) for obstacle in scene.obstacles],
+        path_points_cm=plan.path.points_cm,
+        poses_cm=forward(arm, q_rad[shown]),
+        title=scene.name,
+        subtitle=f"{scene.planner.algorithm} ({scene.planner.neighbours}), {plan.path.length_cm:.4f} cm",
+        tip_curve_cm=forward(arm, q_rad)[:, -1],
+    )
+    draw_joint_angles(joint_angles, t_s, q_rad, limits_rad=scene.arm.joint_limits_rad, title=scene.name)
+    draw_step_rates(
+        step_rates,
+        [joint.ticks for joint in plan.train.steps],
+        directions=[joint.directions for joint in plan.train.steps],
+        ticks_hz=TICKS_HZ,
+        limit_hz=TICKS_HZ / MIN_INTERVAL_TICKS,
+        title=scene.name,
+    )

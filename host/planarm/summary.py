@@ -1,0 +1,89 @@
+"""What a run did, as one flat mapping: the object of `--json`, summary.json and the table on the terminal."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from planarm.link.position import moved_usteps
+from planarm.model.arm import Arm
+from planarm.model.kinematics import forward, tip_jacobian
+from planarm_wire.messages import TICKS_HZ
+
+if TYPE_CHECKING:
+    from planarm.link.exchange import StreamResult
+    from planarm.pipeline import Findings, Plan
+
+
+def summarise(plan: Plan, streamed: StreamResult, findings: Findings | None) -> dict[str, Any]:
+    """Return every figure of a run.
+
+    Args:
+        plan: what was planned.
+        streamed: what the link and the device's ledger say.
+        findings: what the pins showed; None when they cannot be seen (a port that is not in this process).
+    """
+    scene = plan.scene
+    by_ledger_usteps = moved_usteps(streamed.ledger_before, streamed.ledger_after)
+    net_usteps = by_ledger_usteps if findings is None else tuple(m.net_usteps for m in findings.measured)
+    return {
+        "scene": scene.name,
+        "planner": scene.planner.algorithm,
+        "neighbours": scene.planner.neighbours,
+        "seed": scene.planner.seed,
+        "moves": scene.planner.moves,
+        "path_length_cm": round(plan.path.length_cm, 6),
+        "search_ms": round(plan.search_ms, 3),
+        "plan_ms": round(plan.plan_ms, 3),
+        "motion_s": round(plan.trajectory.duration_s, 6),
+        "certificate_ok": plan.certificate.ok,
+        "segments": len(plan.segments.segments),
+        "bytes_sent": streamed.bytes_sent,
+        "retransmissions": streamed.retransmissions,
+        "steps_planned": [len(joint.ticks) for joint in plan.train.steps],
+        "net_usteps_by_ledger": list(by_ledger_usteps),
+        "net_usteps": list(net_usteps),
+        **tip_figures(plan, net_usteps),
+        **_pin_figures(findings),
+    }
+
+
+def tip_figures(plan: Plan, net_usteps: tuple[int, ...]) -> dict[str, float]:
+    """Return how far the end effector stands from the goal, and how far half a micro-step a joint can put it."""
+    arm = Arm.from_spec(plan.scene.arm)
+    usteps_per_rad = np.array([joint.usteps_per_rad for joint in plan.scene.joints])
+    q_rad = (np.array(plan.segments.start_usteps) + np.array(net_usteps)) / usteps_per_rad
+    goal_cm = np.array(plan.scene.task.goal_cm)
+    levers_cm = np.hypot(*tip_jacobian(arm, q_rad))
+    return {
+        "tip_error_mm": round(10.0 * float(np.hypot(*(forward(arm, q_rad)[-1] - goal_cm))), 6),
+        "tip_bound_mm": round(10.0 * float((0.5 / usteps_per_rad * levers_cm).sum()), 6),
+    }
+
+
+def _pin_figures(findings: Findings | None) -> dict[str, Any]:
+    """Return the figures that need the pins' edges; None each when the pins cannot be seen."""
+    if findings is None:
+        return dict.fromkeys(
+            (
+                "steps_at_pins",
+                "max_step_timing_error_ticks",
+                "min_pulse_high_us",
+                "min_pulse_low_us",
+                "min_dir_setup_us",
+            )
+        )
+    comparison, measured = findings.comparison, findings.measured
+    return {
+        "steps_at_pins": list(comparison.steps_at_pins),
+        "max_step_timing_error_ticks": comparison.max_timing_error_ticks,
+        "min_pulse_high_us": _least_us([m.min_high_ticks for m in measured]),
+        "min_pulse_low_us": _least_us([m.min_low_ticks for m in measured]),
+        "min_dir_setup_us": _least_us([m.min_dir_setup_ticks for m in measured]),
+    }
+
+
+def _least_us(ticks: list[int | None]) -> float | None:
+    known = [t for t in ticks if t is not None]
+    return 1e6 * min(known) / TICKS_HZ if known else None

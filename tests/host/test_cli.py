@@ -1,0 +1,87 @@
+"""The command line parses and prints: exit codes, JSON on stdout alone, and nothing heavy for --help."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from planarm.cli.main import main
+
+EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
+HEAVY = ("numpy", "numba", "scipy", "matplotlib", "rich", "serial", "planarm_sim")
+
+
+def leave(capsys, *words):
+    with pytest.raises(SystemExit) as left:
+        main(list(words))
+    captured = capsys.readouterr()
+    return left.value.code, captured.out, captured.err
+
+
+def test_help_loads_nothing_heavy():
+    told = "import sys, planarm.cli.main as m; m.build_parser().format_help(); "
+    told += f"print([name for name in {HEAVY!r} if name in sys.modules])"
+    done = subprocess.run([sys.executable, "-c", told], stdout=subprocess.PIPE, text=True, check=True)
+    assert done.stdout.strip() == "[]"
+
+
+def test_help_names_every_command_and_exit_code(capsys):
+    code, out, _ = leave(capsys, "--help")
+    assert code == 0
+    assert all(word in out for word in ("plan", "run", "stream", "emulate", "7 executed steps differ"))
+
+
+def test_an_unknown_scene_is_bad_input(capsys, tmp_path):
+    code, out, err = leave(capsys, "run", str(tmp_path / "none.toml"))
+    assert (code, out) == (2, "")
+    assert "none.toml" in err
+
+
+def test_an_error_with_json_is_one_object_on_stdout(capsys, tmp_path):
+    broken = tmp_path / "broken.toml"
+    broken.write_text((EXAMPLES / "table1_case1.toml").read_text().replace("link_width_cm", "link_widht_cm"))
+    code, out, _ = leave(capsys, "run", str(broken), "--json")
+    error = json.loads(out)["error"]
+    assert code == error["exit_code"] == 2
+    assert "link_width_cm" in error["message"], "the closest known key is named"
+
+
+def test_a_walled_in_goal_is_exit_code_3(capsys, tmp_path):
+    """A thin polygon from the inner hole to beyond the reach, between start and goal, cuts the free space in two."""
+    text = (EXAMPLES / "table1_case1.toml").read_text()
+    wall = '\n[[obstacles]]\nshape = "polygon"\nvertices_cm = [[30, 25], [38, 34], [37, 35], [29, 26]]\n'
+    scene = tmp_path / "walled.toml"
+    scene.write_text(text.replace("[task]", wall + "\n[task]"))
+    code, out, _ = leave(capsys, "plan", str(scene), "-o", str(tmp_path / "x.plan"), "--json")
+    assert code == 3, out
+    assert not (tmp_path / "x.plan").exists()
+
+
+def test_an_unreachable_port_is_exit_code_5(capsys, tmp_path):
+    code, _, err = leave(
+        capsys, "run", str(EXAMPLES / "table1_case1.toml"), "--port", str(tmp_path / "tty"), "--out", str(tmp_path)
+    )
+    assert code == 5
+    assert str(tmp_path / "tty") in err
+
+
+def test_plan_then_stream_through_the_emulator(capsys, tmp_path):
+    target = tmp_path / "case2.plan"
+    code, out, _ = leave(capsys, "plan", str(EXAMPLES / "table1_case2.toml"), "-o", str(target), "--json")
+    assert code == 0, out
+    code, out, _ = leave(capsys, "stream", str(target), "--json")
+    assert code == 0, out
+    assert all(isinstance(steps, int) for steps in json.loads(out)["moved_usteps"])
+
+
+def test_a_changed_plan_is_not_streamed(capsys, tmp_path):
+    target = tmp_path / "case1.plan"
+    leave(capsys, "plan", str(EXAMPLES / "table1_case1.toml"), "-o", str(target))
+    body = json.loads(target.read_text())
+    body["segments"][0][0] += 2
+    target.write_text(json.dumps(body))
+    code, _, err = leave(capsys, "stream", str(target))
+    assert code == 4
+    assert "SHA-256" in err
