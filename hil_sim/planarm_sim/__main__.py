@@ -6,10 +6,9 @@ import argparse
 import sys
 from collections.abc import Sequence
 
-from planarm_wire import messages
-
 from planarm_sim.emulate import Emulation, emulate
 from planarm_sim.errors import SimError
+from planarm_wire import messages
 
 __all__ = ["main", "summary"]
 
@@ -57,7 +56,7 @@ def summary(result: Emulation) -> str:
     edges = ", ".join(f"{name} {count}" for name, count in result.rising_edges.items()) or "none"
     return (
         f"{result.ended}; {result.cycles} cycles in {result.clock_s:.2f} s ({result.ratio:.2f} x real time); "
-        f"rising edges: {edges}; serial: {result.counts.from_host_bytes} bytes in, "
+        f"rising edges: {edges}; serial: opened {result.counts.opened} x, {result.counts.from_host_bytes} bytes in, "
         f"{result.counts.to_host_bytes} out, {result.counts.lost_bytes} lost"
     )
 

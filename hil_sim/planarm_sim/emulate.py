@@ -11,12 +11,12 @@ from pathlib import Path
 from types import FrameType
 
 import numpy as np
-from planarm_wire import messages
 
 from planarm_sim.board import PINS, Uno, pin_name
-from planarm_sim.bridge import Bridge, BridgeCounts, Clock, Line, Speed, WallClock
+from planarm_sim.bridge import BOOT_S, Bridge, BridgeCounts, Clock, Line, Speed, WallClock
 from planarm_sim.errors import BridgeError, StoppedError
 from planarm_sim.trace import VcdWriter
+from planarm_wire import messages
 
 __all__ = ["TRACED_PINS", "Emulation", "Stop", "emulate", "run_board"]
 
@@ -122,7 +122,9 @@ def run_board(
     start_cycle, start_s = uno.cycle, clock.now_s()
     with ExitStack() as stack:
         edges = _EdgeSink(uno, stack.enter_context(_open_vcd(uno, vcd)) if vcd is not None else None)
-        bridge = Bridge(uno, line, clock, speed=speed, reset_on_open=reset_on_open, say=say, after_run=edges.take)
+        bridge = Bridge(
+            uno, line, clock, speed=speed, boot_s=BOOT_S if reset_on_open else None, say=say, after_run=edges.take
+        )
         ended, failed = "stopped", False
         try:
             bridge.run(seconds, until=lambda: stop.requested)

@@ -3,6 +3,7 @@
 from pathlib import Path
 
 import pytest
+
 from planarm_sim import Uno
 from planarm_sim.board import CLOCK_HZ
 from planarm_sim.bridge import Bridge
@@ -16,7 +17,7 @@ POWER_UP, RESET = b"R\x01", b"R\x02"  # what echo.S sends first: 'R' and MCUSR
 
 
 class Rig:
-    def __init__(self, acts, *, image="echo.hex", speed="real", reset_on_open=True, cost_s=0.0, room=10**6) -> None:
+    def __init__(self, acts, *, image="echo.hex", speed="real", boot_s=0.0, cost_s=0.0, room=10**6) -> None:
         self.uno = Uno.from_hex(DATA / image)
         self.uno.run(seconds=BOOT_S)  # the program has greeted, and cleared MCUSR
         self.clock = FakeClock()
@@ -28,7 +29,7 @@ class Rig:
             self.line,
             self.clock,
             speed=speed,
-            reset_on_open=reset_on_open,
+            boot_s=boot_s,
             say=self.said.append,
             after_run=self._count,
         )
@@ -118,7 +119,7 @@ def test_closing_and_opening_at_once_is_an_opening():
 
 
 def test_opening_can_be_harmless():
-    rig = Rig([(0.05, "open"), (0.06, b"a"), (0.10, "close"), (0.15, "open"), (0.16, b"c")], reset_on_open=False)
+    rig = Rig([(0.05, "open"), (0.06, b"a"), (0.10, "close"), (0.15, "open"), (0.16, b"c")], boot_s=None)
     rig.bridge.run(seconds=0.2)
     assert rig.line.text == b"bd"
 
@@ -137,6 +138,31 @@ def test_a_host_that_does_not_read_loses_bytes_and_stops_nothing():
     rig.bridge.run(seconds=0.05)
     assert rig.line.text == RESET + bytes([8] * 10)
     assert rig.bridge.counts.lost_bytes == 40 + len(POWER_UP)
+
+
+def test_an_opened_board_stays_in_reset_while_the_boot_loader_would_run():
+    rig = Rig([(0.05, "open"), (0.10, b"lost"), (0.149, b"lost"), (0.16, b"a")], boot_s=0.1)
+    rig.bridge.run(seconds=0.2)
+    assert rig.line.text == RESET + b"b"
+    assert 0.15 <= rig.line.received[0][0] <= 0.15 + 2 * QUIET_SLICE_S
+    assert rig.clock.time_s == pytest.approx(0.2 + 0.1, abs=3 * QUIET_SLICE_S), "the board's time stands still"
+    assert rig.said == [], "and that is no lag"
+    assert rig.bridge.counts.from_host_bytes == 1
+
+
+def test_opening_twice_during_reset_starts_it_again():
+    rig = Rig([(0.05, "open"), (0.1, "close"), (0.12, "open")], boot_s=0.1)
+    rig.bridge.run(seconds=0.2)
+    assert rig.line.text == RESET
+    assert rig.line.received[0][0] >= 0.22
+
+
+def test_bytes_on_the_line_at_an_opening_are_the_old_programs():
+    rig = Rig([(0.05, "open"), (0.1, b"abcdef"), (0.1001, "close"), (0.1001, "open")])
+    rig.bridge.run(seconds=0.2)
+    assert rig.line.text == RESET + RESET
+    assert rig.bridge.counts.from_host_bytes == 6
+    assert 4 <= rig.bridge.counts.lost_bytes - len(POWER_UP) <= 6, "all were heard; the last echoes are cut off"
 
 
 # --- too slow, stopped, as fast as it goes ---

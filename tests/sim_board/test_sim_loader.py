@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+
 from planarm_sim.errors import ImageError
 from planarm_sim.loader import FLASH_BYTES, load_elf, load_hex, load_image
 from planarm_sim.loader.elf import parse_elf

@@ -5,6 +5,7 @@ import sys
 from pathlib import Path
 
 import pytest
+
 from planarm_sim.bridge.pty_line import PtyLine
 from planarm_sim.errors import BridgeError
 

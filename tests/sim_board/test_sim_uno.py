@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+
 from planarm_sim import Uno
 from planarm_sim.board import CLOCK_HZ, PINS
 from planarm_sim.board.pins import pin_name, pin_place

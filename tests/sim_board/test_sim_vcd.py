@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+
 from planarm_sim.errors import TraceError
 from planarm_sim.trace import EDGE, UNITS_PER_CYCLE, VcdWriter, read_vcd
 

@@ -77,6 +77,11 @@ class SerialPort:
         return len(self._ends)
 
     @property
+    def idle_cycle(self) -> int:
+        """Cycle at which the last byte written has passed; it may be over already."""
+        return self._line_free_cycle()
+
+    @property
     def framing_errors(self) -> int:
         """Bytes received so far whose stop bit was not where the host looked: the baud rates differ."""
         return self._framing_errors

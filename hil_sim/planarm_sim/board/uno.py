@@ -13,7 +13,6 @@ from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
-from planarm_wire import messages
 
 from planarm_sim.board.pins import PINS, PinPlace, pin_place
 from planarm_sim.board.serial import CLOCK_HZ, FRAME_BITS, SerialPort, SerialState
@@ -21,6 +20,7 @@ from planarm_sim.cpu.chip import EDGE_DTYPE, Chip, ResetCause, Snapshot, StopCau
 from planarm_sim.errors import LimitError, PinError, StoppedError, UsageError
 from planarm_sim.loader import Image, load_elf, load_hex, load_image
 from planarm_sim.trace import EDGE, VcdWriter
+from planarm_wire import messages
 
 __all__ = ["CLOCK_HZ", "Pin", "Uno", "UnoSnapshot"]
 

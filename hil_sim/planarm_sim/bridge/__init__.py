@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from planarm_sim.bridge.bridge import Bridge, BridgeCounts, Speed
+from planarm_sim.bridge.bridge import BOOT_S, Bridge, BridgeCounts, Speed
 from planarm_sim.bridge.line import Clock, Line, WallClock
 
-__all__ = ["Bridge", "BridgeCounts", "Clock", "Line", "Speed", "WallClock"]
+__all__ = ["BOOT_S", "Bridge", "BridgeCounts", "Clock", "Line", "Speed", "WallClock"]

@@ -35,6 +35,10 @@ QUIET_SLICE_S = 0.002
 QUIET_AFTER_S = 0.005
 """The line counts as lively for so long after its last byte: a firmware's answer may be under way."""
 
+BOOT_S = 0.1
+"""How long an opened board stays in reset, by the clock. Hosts flush their buffers just after opening and would lose
+what a board that runs at once sends first. A real Uno's boot loader takes longer: 0.5 to 1.5 s."""
+
 MAX_CHUNK_S = 0.010
 """Longest piece of emulated time between two looks at the line."""
 
@@ -69,7 +73,8 @@ class Bridge:
         line: the host's side.
         clock: the time that `speed` "real" follows.
         speed: see the module's text.
-        reset_on_open: press reset when a host opens the line, as a Uno does (its DTR line resets it).
+        boot_s: seconds by the clock for which the board stays in reset when a host opens the line, as a Uno does (its
+            DTR line resets it); what the host sends meanwhile is lost. None: opening changes nothing.
         say: takes notices for the user, one line each.
         after_run: called after every piece of emulated time, to carry recorded edges away.
     """
@@ -81,7 +86,7 @@ class Bridge:
         clock: Clock,
         *,
         speed: Speed = "real",
-        reset_on_open: bool = True,
+        boot_s: float | None = BOOT_S,
         say: Callable[[str], None],
         after_run: Callable[[], None],
     ) -> None:
@@ -89,7 +94,8 @@ class Bridge:
         self._line = line
         self._clock = clock
         self._real = speed == "real"
-        self._reset_on_open = reset_on_open
+        self._boot_s = boot_s
+        self._boots_at_s: float | None = None  # in reset until then
         self._say = say
         self._after_run = after_run
         self._is_open = False
@@ -117,6 +123,9 @@ class Bridge:
     def step(self, end_cycle: int | None = None) -> None:
         """Run the chip up to now (at most to `end_cycle`), serve the line, and sleep for the time that is left."""
         self._notice_open()
+        if self._boots_at_s is not None:
+            self._stay_in_reset(self._boots_at_s)
+            return
         uno = self._uno
         target = min(self._target_cycle(), uno.cycle + round(MAX_CHUNK_S * CLOCK_HZ))
         if end_cycle is not None:
@@ -132,9 +141,26 @@ class Bridge:
         if self._line.opened():
             self._opened += 1
             self._lost += len(self._uno.serial.read())  # nobody was there
-            if self._reset_on_open:
-                self._uno.reset()
+            if self._boot_s is not None:
+                self._reset(self._boot_s)
         self._is_open = self._line.is_open()
+
+    def _reset(self, boot_s: float) -> None:
+        uno = self._uno
+        uno.run(cycles=max(uno.serial.idle_cycle - uno.cycle, 0))  # what is on the line is the old program's
+        self._lost += len(uno.serial.read())
+        uno.reset()
+        self._boots_at_s = self._clock.now_s() + boot_s
+
+    def _stay_in_reset(self, boots_at_s: float) -> None:
+        """Let the clock run and the board stand still; the boot loader gets what the host sends."""
+        now_s = self._clock.now_s()
+        if now_s < boots_at_s:
+            self._line.read(BRIDGE_RING_BYTES)
+            self._line.wait(min(boots_at_s - now_s, QUIET_SLICE_S), for_bytes=False)
+        else:
+            self._boots_at_s = None
+            self._anchor_s, self._anchor_cycle = now_s, self._uno.cycle
 
     def _target_cycle(self) -> int:
         uno = self._uno
