@@ -6,18 +6,12 @@ so a tolerance for that distance gives the largest d. Each leg is shared by the 
 A curve that cannot be proved free is tried with half of d, and so on; a corner left sharp is a stop.
 """
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
-
 import numpy as np
 
+from planarm.search.path import Path
 from planarm.smoothing.smooth_path import Floats, SmoothPath, TwoLinks, angle_between, joint_angles
+from planarm.workspace.free_map import FreeMap
 from planarm.workspace.proof import PROVED, prove_curve
-
-if TYPE_CHECKING:
-    from planarm.search.path import Path
-    from planarm.workspace.free_map import FreeMap
 
 __all__ = ["SmoothPath", "blend_corners"]
 

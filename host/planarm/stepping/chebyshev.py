@@ -10,6 +10,7 @@ from math import cos, pi
 
 import numpy as np
 from numpy.typing import NDArray
+
 from planarm_wire.kernel_cache import kernel
 
 Floats = NDArray[np.float64]
@@ -56,7 +57,7 @@ def best_polynomial(at: Floats, center: Floats, half: Floats, degree: int) -> tu
 def spread(reference: Indices) -> None:
     """Make ascending indices, from 0 to the last, different from each other."""
     size = reference.shape[0]
-    for k in range(1, size):
+    for k in range(1, size - 1):
         reference[k] = max(reference[k], reference[k - 1] + 1)
     for k in range(size - 2, -1, -1):
         reference[k] = min(reference[k], reference[k + 1] - 1)

@@ -5,13 +5,13 @@ asked.
 """
 
 import numpy as np
-from planarm_wire.messages import TICKS_HZ
 
 from planarm.scene import JointSpec
 from planarm.stepping.certificate import Check, at_most
 from planarm.stepping.quantise import TIMING_USTEPS, hysteresis_usteps
 from planarm.stepping.train import Floats, StepTrain
 from planarm.trajectory.motion import Trajectory
+from planarm_wire.messages import TICKS_HZ
 
 POINTS_PER_S = 10_000
 LEAST_POINTS = 1_000

@@ -9,13 +9,13 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from planarm_wire.messages import TICKS_HZ
 
 from planarm.model.shapes import shape_of
 from planarm.scene import JointSpec, Scene
 from planarm.stepping.certificate import Check, Verdict, at_least, at_most
 from planarm.stepping.clearance import joint_positions_cm, link_clearance_cm
 from planarm.stepping.train import Floats, StepTrain, Ticks
+from planarm_wire.messages import TICKS_HZ
 
 ROUNDING_CM = 1e-9
 

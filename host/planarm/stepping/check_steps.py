@@ -1,6 +1,11 @@
 """Certificate, part one: the steps themselves, taken from the expanded segments."""
 
 import numpy as np
+
+from planarm.scene import JointSpec
+from planarm.stepping.certificate import Check, at_least, at_most
+from planarm.stepping.plan import SegmentPlan
+from planarm.stepping.train import JointSteps, StepTrain, Ticks
 from planarm_wire.codec import encoded_bytes
 from planarm_wire.messages import (
     BAUD,
@@ -16,11 +21,6 @@ from planarm_wire.messages import (
     Move,
     Segment,
 )
-
-from planarm.scene import JointSpec
-from planarm.stepping.certificate import Check, at_least, at_most
-from planarm.stepping.plan import SegmentPlan
-from planarm.stepping.train import JointSteps, StepTrain, Ticks
 
 BITS_PER_BYTE = 10
 """On the line: start bit, eight bits, stop bit."""
@@ -136,6 +136,8 @@ def _problems(segment: Segment) -> list[str]:
             problems.append(f"{count} steps of joint {number}")
         if any(not MIN_INTERVAL_TICKS <= i / 65536 <= MAX_INTERVAL_TICKS for i in intervals):
             problems.append(f"intervals of joint {number}")
+        if not -(1 << 31) <= move.add_q16 < 1 << 31:
+            problems.append(f"add of joint {number}")
         if count and not 0 <= move.first_ticks <= _last_tick(move) < duration:
             problems.append(f"step of joint {number} outside the segment")
     return problems

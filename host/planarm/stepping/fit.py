@@ -10,10 +10,10 @@ from math import floor
 
 import numpy as np
 from numpy.typing import NDArray
-from planarm_wire.kernel_cache import kernel
-from planarm_wire.messages import MAX_INTERVAL_TICKS
 
 from planarm.stepping.chebyshev import best_polynomial
+from planarm_wire.kernel_cache import kernel
+from planarm_wire.messages import MAX_INTERVAL_TICKS
 
 Ticks = NDArray[np.int64]
 Floats = NDArray[np.float64]
@@ -21,6 +21,8 @@ Fit = tuple[bool, int, int, int]
 """(found, first_ticks, interval_q16, add_q16)"""
 
 ONE_Q16 = 65536
+LEAST_ADD = -(1 << 31)
+"""The wire's add is a signed number of 32 bits."""
 
 
 @kernel
@@ -60,6 +62,8 @@ def placed(low: Ticks, high: Ticks, least_interval: int, interval: int, add: int
     if steps > 1 and min(interval, last_interval) < least_interval * ONE_Q16:
         return False, 0, 0, 0
     if steps > 1 and max(interval, last_interval) > MAX_INTERVAL_TICKS * ONE_Q16:
+        return False, 0, 0, 0
+    if not LEAST_ADD <= add <= -LEAST_ADD - 1:
         return False, 0, 0, 0
     earliest, latest = low[0], high[0]
     for n in range(1, steps):

@@ -7,11 +7,11 @@ joint's next step can still be made, at the latest in its window. So one step of
 
 import numpy as np
 from numpy.typing import NDArray
-from planarm_wire.kernel_cache import kernel
-from planarm_wire.messages import MAX_SEGMENT_TICKS
 
 from planarm.stepping.fit import fit_run
 from planarm.stepping.windows import GAP, HIGH, LOW, RUN_END, SETUP, Windows
+from planarm_wire.kernel_cache import kernel
+from planarm_wire.messages import MAX_SEGMENT_TICKS
 
 Ticks = NDArray[np.int64]
 
@@ -21,9 +21,8 @@ COUNT, FIRST, INTERVAL, ADD = 0, 1, 2, 3
 NEVER = -(1 << 62)
 
 
-@kernel
-def cut(windows: Windows, order: Ticks, duration_ticks: int, ends: Ticks, runs: Ticks) -> int:
-    """Fill `ends`, the end of each segment in ticks, and `runs`; return the number of segments.
+def cut(windows: Windows, order: Ticks, duration_ticks: int) -> tuple[list[int], list[Ticks]]:
+    """Return (ends, runs): the tick at which each segment ends, and its runs, shape (joints, 4).
 
     By the invariant the last end is `duration_ticks`; the caller expands and checks it.
 
@@ -31,26 +30,24 @@ def cut(windows: Windows, order: Ticks, duration_ticks: int, ends: Ticks, runs: 
         windows: the steps.
         order: the joint of each step of all joints, in the order of time.
         duration_ticks: the motion's end, where the last segment ends.
-        ends: shape (room,).
-        runs: shape (room, joints, 4).
     """
-    joints = runs.shape[1]
-    following, last = np.empty(joints, np.int64), np.empty(joints, np.int64)
-    for j in range(joints):
-        following[j], last[j] = windows.first[j], NEVER
-    begin, segments, done, length = 0, 0, 0, 1
-    while 0 <= begin < duration_ticks and segments < ends.shape[0]:
-        end, length = longest(windows, order, done, following, last, begin, duration_ticks, length, runs[segments])
-        for j in range(joints):
-            n = runs[segments, j, COUNT] - 1
-            if n >= 0:
-                since_first = (n * runs[segments, j, INTERVAL] + n * (n - 1) // 2 * runs[segments, j, ADD]) >> 16
-                last[j] = begin + runs[segments, j, FIRST] + since_first
-            following[j] += n + 1
-            done += n + 1
-        begin = ends[segments] = end
-        segments += 1
-    return segments
+    joints = len(windows.least_interval)
+    following, last = windows.first[:-1].copy(), np.full(joints, NEVER)
+    ends, runs = [], []
+    begin, done, length = 0, 0, 1
+    while 0 <= begin < duration_ticks:
+        best = np.zeros((joints, 4), np.int64)
+        end, length = longest(windows, order, done, following, last, begin, duration_ticks, length, best)
+        for j, (count, first, interval, add) in enumerate(best.tolist()):
+            if count > 0:
+                n = count - 1
+                last[j] = begin + first + ((n * interval + n * (n - 1) // 2 * add) >> 16)
+        following += best[:, COUNT]
+        done += int(best[:, COUNT].sum())
+        ends.append(end)
+        runs.append(best)
+        begin = end
+    return ends, runs
 
 
 @kernel

@@ -14,7 +14,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from planarm_wire.messages import MIN_DIR_SETUP_TICKS, TICKS_HZ
 
 from planarm.errors import TimingError
 from planarm.model.arm import Arm
@@ -30,6 +29,7 @@ from planarm.stepping.train import (
     to_usteps,
 )
 from planarm.trajectory.motion import Trajectory
+from planarm_wire.messages import MIN_DIR_SETUP_TICKS, TICKS_HZ
 
 __all__ = ["JointSteps", "StepTrain", "hysteresis_usteps", "quantisation_bound_cm", "quantise"]
 

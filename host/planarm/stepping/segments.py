@@ -1,7 +1,8 @@
 """Compress a step train into the wire's segments, and check the result by expanding it again."""
 
+from itertools import pairwise
+
 import numpy as np
-from planarm_wire.messages import MAX_SEGMENT_TICKS, Move, Segment
 
 from planarm.errors import TimingError
 from planarm.stepping.expand import expand
@@ -9,6 +10,7 @@ from planarm.stepping.greedy import ADD, COUNT, FIRST, INTERVAL, cut
 from planarm.stepping.plan import SegmentPlan
 from planarm.stepping.train import StepTrain, Ticks, require_steppable
 from planarm.stepping.windows import tolerance_ticks, windows_of
+from planarm_wire.messages import Move, Segment
 
 __all__ = ["SegmentPlan", "compress", "expand"]
 
@@ -27,29 +29,25 @@ def compress(train: StepTrain) -> SegmentPlan:
     windows = windows_of(train)
     joint_of = np.repeat(np.arange(len(train.steps)), np.diff(windows.first))
     order = joint_of[np.argsort(np.concatenate([joint.ticks for joint in train.steps]), kind="stable")]
-    room = len(order) + 2 + train.duration_ticks // MAX_SEGMENT_TICKS  # a step each, and rests
-    ends, runs = np.zeros(room, np.int64), np.zeros((room, len(train.steps), 4), np.int64)
-    count = cut(windows, order, train.duration_ticks, ends, runs)
-    ends, runs = ends[:count], runs[:count]
+    ends, runs = cut(windows, order, train.duration_ticks)
     plan = SegmentPlan(_segments(train, ends, runs), train.duration_ticks, train.start_usteps)
     _require_same_steps(train, expand(plan))
     return plan
 
 
-def _segments(train: StepTrain, ends: Ticks, runs: Ticks) -> tuple[Segment, ...]:
+def _segments(train: StepTrain, ends: list[int], runs: list[Ticks]) -> tuple[Segment, ...]:
     """Return the wire's form of the runs; a run's direction is that of its first step in the train."""
     following = [0] * len(train.steps)
     segments = []
-    durations = np.diff(ends, prepend=0)
-    for k, duration in enumerate(durations.tolist()):
+    for k, (begin, end) in enumerate(pairwise([0, *ends])):
         moves = []
         for j, run in enumerate(runs[k].tolist()):
             count = run[COUNT]
             positive = count > 0 and train.steps[j].directions[following[j]] > 0
             moves.append(Move(2 * count + int(positive), run[FIRST], run[INTERVAL], run[ADD]))
             following[j] += count
-        is_last = k == len(durations) - 1
-        segments.append(Segment(2 * duration + int(is_last), tuple(moves)))
+        is_last = k == len(ends) - 1
+        segments.append(Segment(2 * (end - begin) + int(is_last), tuple(moves)))
     return tuple(segments)
 
 

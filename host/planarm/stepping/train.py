@@ -5,10 +5,10 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from planarm_wire.messages import MIN_DIR_SETUP_TICKS, MIN_INTERVAL_TICKS, TICKS_HZ
 
 from planarm.errors import TimingError
 from planarm.scene import JointSpec
+from planarm_wire.messages import MIN_DIR_SETUP_TICKS, MIN_INTERVAL_TICKS, TICKS_HZ
 
 Ticks = NDArray[np.int64]
 Directions = NDArray[np.int8]

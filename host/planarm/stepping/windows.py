@@ -8,10 +8,10 @@ ticks keep all gaps, so they stay inside, and from any choice up to some step th
 from typing import NamedTuple
 
 import numpy as np
-from planarm_wire.kernel_cache import kernel
-from planarm_wire.messages import MAX_INTERVAL_TICKS, MAX_SEGMENT_STEPS, MIN_DIR_SETUP_TICKS, MIN_INTERVAL_TICKS
 
 from planarm.stepping.train import MIN_REVERSAL_TICKS, Directions, JointSteps, StepTrain, Ticks
+from planarm_wire.kernel_cache import kernel
+from planarm_wire.messages import MAX_INTERVAL_TICKS, MAX_SEGMENT_STEPS, MIN_DIR_SETUP_TICKS, MIN_INTERVAL_TICKS
 
 TOLERANCE_TICKS = 16
 TOLERANCE_SHARE = 0.02

@@ -1,6 +1,8 @@
-"""How far a trajectory stands from its limits, on a grid ten times denser than its own.
+"""How far a trajectory stands from its limits, on a grid ten times denser than its own and between its points.
 
-Independent of the solver: it takes the derivatives of the path and the finished s(t), nothing in between.
+Independent of the solver: it takes the derivatives of the path and the finished s(t), nothing in between. Between two
+points of the dense grid a value can exceed both by an eighth of its second difference (the height of a parabola over
+its chord), so that is added.
 """
 
 from dataclasses import dataclass
@@ -15,10 +17,17 @@ SUBSTEPS = 10
 
 @dataclass(frozen=True, slots=True)
 class LimitUse:
-    """The largest share of each limit that is used inside each interval, shape (intervals, joints); 1 is the limit."""
+    """Shares of the limits that are used inside each interval; 1 is the limit.
+
+    Attributes:
+        speed: the largest, of each joint's speed, shape (intervals, joints).
+        acceleration: the largest, of each joint's acceleration, shape (intervals, joints).
+        slack: how much of the nearest limit of any joint is unused at the point where that is most, shape (intervals,).
+    """
 
     speed: Floats
     acceleration: Floats
+    slack: Floats
 
 
 def limit_use(trajectory: Trajectory, speeds_rad_s: Floats, accelerations_rad_s2: Floats) -> LimitUse:
@@ -35,6 +44,17 @@ def limit_use(trajectory: Trajectory, speeds_rad_s: Floats, accelerations_rad_s2
     shape = (len(lengths), SUBSTEPS, -1)
     dq = np.concatenate([inner.dq_rad.reshape(shape), ends.dq_rad[:, None]], axis=1)
     ddq = np.concatenate([inner.ddq_rad.reshape(shape), ends.ddq_rad[:, None]], axis=1)
-    speed = np.abs(dq) * np.sqrt(x)[..., None] / speeds_rad_s
-    acceleration = np.abs(dq * u + ddq * x[..., None]) / accelerations_rad_s2
-    return LimitUse(speed.max(axis=1), acceleration.max(axis=1))
+    speed2 = dq**2 * x[..., None] / speeds_rad_s**2
+    acceleration = (dq * u + ddq * x[..., None]) / accelerations_rad_s2
+    nearest = np.maximum(np.sqrt(speed2), np.abs(acceleration)).max(axis=2)
+    return LimitUse(
+        np.sqrt(speed2.max(axis=1) + _between(speed2)),
+        np.abs(acceleration).max(axis=1) + _between(acceleration),
+        1.0 - nearest.min(axis=1),
+    )
+
+
+def _between(values: Floats) -> Floats:
+    """Return how much the values, of shape (intervals, points, joints), can exceed their largest between two points."""
+    height: Floats = np.abs(np.diff(values, n=2, axis=1)).max(axis=1) / 8.0
+    return height

@@ -1,14 +1,15 @@
 """Time a joint path: as fast as every joint's speed and a share of its acceleration allow.
 
 Solve on a grid, look at the result on a grid ten times denser, split the intervals in which a limit is exceeded
-notably, tighten those in which it is exceeded a little, solve again; what is left in the end is removed by running the
-whole motion slower. So the returned trajectory never exceeds a limit.
+notably or in which time is lost, tighten those in which it is exceeded a little, solve again; what is left in the end
+is removed by running the whole motion slower. So the returned trajectory never exceeds a limit.
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from planarm.errors import TimingError
 from planarm.scene import JointSpec
@@ -23,8 +24,8 @@ STOPPING_SHARE = 0.8
 """Share of each joint's acceleration that a plan uses; what is left keeps a stop along the path possible."""
 
 HEADROOM = 1.0 - 1e-4
-"""Planned share of each limit. Between the points of the dense check an excess can be a hundredth of the one that the
-check leaves between gridpoints (SPLIT_ABOVE), so this covers it ten times."""
+"""Planned share of each limit. The dense check knows what happens between its points to second order; this covers the
+rest many times."""
 
 FIRST_STEP_RAD = 0.02
 MIN_INTERVALS = 8
@@ -32,8 +33,9 @@ MAX_INTERVALS = 1 << 14
 SPLIT_ABOVE = 1.0 + 1e-3
 SLOW_BELOW = 1.0 + 1e-5
 ROUNDS = 16
-"""An interval that exceeds a limit beyond SPLIT_ABOVE is split, else tightened; from SLOW_BELOW on, or after ROUNDS,
-the whole motion is run slower by the rest."""
+LOST_SHARE = 1e-4
+"""An interval that exceeds a limit beyond SPLIT_ABOVE, or loses this share of the duration, is split, else
+tightened where it exceeds a limit; from SLOW_BELOW on, or after ROUNDS, the whole motion is run slower by the rest."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,9 +75,10 @@ def time_path(path: JointPath, joints: Sequence[JointSpec], share: float = STOPP
     trajectory = _solve(path, grid, limits)
     for _ in range(ROUNDS):
         use = limit_use(trajectory, limits.speeds_rad_s, limits.accelerations_rad_s2)
-        if max(use.speed.max(), use.acceleration.max()) <= SLOW_BELOW:
+        coarse = _coarse(trajectory, use)
+        if max(use.speed.max(), use.acceleration.max()) <= SLOW_BELOW and not coarse.any():
             break
-        grid = _refine(grid, use)
+        grid = _refine(grid, use, coarse)
         trajectory = _solve(path, grid, limits)
     else:
         use = limit_use(trajectory, limits.speeds_rad_s, limits.accelerations_rad_s2)
@@ -171,16 +174,27 @@ def _squared_limits(path: JointPath, grid: _Grid, limits: _Limits, dq_start: Flo
     return rate**2
 
 
-def _refine(grid: _Grid, use: LimitUse) -> _Grid:
-    """Split the intervals that exceed a limit notably, tighten those that exceed it a little."""
-    worst = np.maximum(use.speed, use.acceleration).max(axis=1)
-    split = (worst > SPLIT_ABOVE) & (len(grid.s) + np.count_nonzero(worst > SPLIT_ABOVE) <= MAX_INTERVALS)
-    tight = (~split)[:, None]
+def _coarse(trajectory: Trajectory, use: LimitUse) -> NDArray[np.bool_]:
+    """Tell which intervals to split: those that exceed a limit notably, and those that lose time.
+
+    The fastest motion uses some limit up at every moment. An interval in which the limits change places cannot, since
+    its acceleration is constant; it loses at most the unused share of its time.
+    """
+    lost_s = use.slack * np.diff(trajectory.t_s)
+    coarse = (np.maximum(use.speed, use.acceleration).max(axis=1) > SPLIT_ABOVE) | (
+        lost_s > LOST_SHARE * trajectory.duration_s
+    )
+    return coarse if len(coarse) + np.count_nonzero(coarse) <= MAX_INTERVALS else np.zeros(len(coarse), np.bool_)
+
+
+def _refine(grid: _Grid, use: LimitUse, coarse: NDArray[np.bool_]) -> _Grid:
+    """Split the coarse intervals, tighten the others where they exceed a limit a little."""
+    tight = ~coarse[:, None]
     speed = np.where(tight, grid.speed_share / np.maximum(1.0, use.speed), grid.speed_share)
     acceleration = np.where(tight, grid.acceleration_share / np.maximum(1.0, use.acceleration), grid.acceleration_share)
-    repeats = 1 + split
+    repeats = 1 + coarse
     middles = 0.5 * (grid.s[:-1] + grid.s[1:])
-    s = np.sort(np.concatenate([grid.s, middles[split]]))
+    s = np.sort(np.concatenate([grid.s, middles[coarse]]))
     return _Grid(s, np.repeat(speed, repeats, axis=0), np.repeat(acceleration, repeats, axis=0))
 
 

@@ -12,6 +12,7 @@ x in [0, controllable]. The backward pass finds them; the forward pass takes the
 
 import numpy as np
 from numpy.typing import NDArray
+
 from planarm_wire.kernel_cache import kernel
 
 Floats = NDArray[np.float64]
