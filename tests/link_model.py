@@ -4,6 +4,7 @@ It is written from `protocol/messages.toml` alone: what a frame does, when a rep
 link's tests run against it where they need faults that the released firmware on the emulator cannot be given.
 """
 
+import contextlib
 import heapq
 import random
 from collections import deque
@@ -11,10 +12,12 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from itertools import count
 
+from planarm.errors import LinkError
 from planarm_wire.codec import decode, encode
 from planarm_wire.errors import WireError
 from planarm_wire.framing import Frame, FrameDecoder, encode_frame
 from planarm_wire.messages import (
+    MIN_INTERVAL_TICKS,
     PROTOCOL_VERSION,
     QUEUE_SLOTS,
     RX_RING_BYTES,
@@ -36,8 +39,6 @@ from planarm_wire.messages import (
     Welcome,
 )
 from planarm_wire.steps import direction, duration_ticks, is_last, step_ticks
-
-from planarm.errors import LinkError
 
 BYTE_S = 10 / 250_000
 USB_FLUSH_S = 65_536 / 16_000_000  # the USB bridge hands replies to the computer when its timer 0 overflows
@@ -151,10 +152,8 @@ class Device:
 
     def _on_frame(self, frame: Frame) -> None:
         message: object = None
-        try:
+        with contextlib.suppress(WireError):
             message = decode(frame.type_code, frame.payload)
-        except WireError:
-            pass
         if isinstance(message, Hello):
             self.expected = (frame.seq + 1) % 256
             self.refusal = Result.OK
@@ -295,7 +294,7 @@ class ModelLine:
 
     def __init__(self, to_device: Damage | None = None, to_host: Damage | None = None, seed: int = 0) -> None:
         self.events = Events()
-        self.device = Device(self.events, send=self._from_device)
+        self.device = Device(self.events, send=self.from_device)
         self.to_device = to_device or Damage()
         self.to_host = to_host or Damage()
         self.cut = False
@@ -330,7 +329,9 @@ class ModelLine:
         for byte in data:
             self._out_free_s = max(self._out_free_s, self.events.now_s) + BYTE_S
             for arriving in b"" if self.cut else self.to_device.apply(byte, self._chance):
-                self.events.at(self._out_free_s + self.to_device.delay_s, self._arrival(self.device.take_byte, arriving))
+                self.events.at(
+                    self._out_free_s + self.to_device.delay_s, self._arrival(self.device.take_byte, arriving)
+                )
 
     def close(self) -> None:
         self._open = False
@@ -339,7 +340,7 @@ class ModelLine:
         if not self._open:
             raise LinkError("port model: closed")
 
-    def _from_device(self, data: bytes) -> float:
+    def from_device(self, data: bytes) -> float:
         for byte in data:
             self._in_free_s = max(self._in_free_s, self.events.now_s) + BYTE_S
             handed_s = self._in_free_s + self.to_host.delay_s
@@ -355,24 +356,24 @@ class ModelLine:
 
 
 def motion(count: int, ticks: int = 32_000, seed: int = 1) -> tuple[Segment, ...]:
-    """A motion of `count` segments of `ticks` each, with steps that differ from segment to segment."""
+    """A motion of `count` segments of `ticks` each, within the protocol's limits, different from one to the next."""
     chance = random.Random(seed)
-    segments = [_segment(chance, ticks) for _ in range(count)]
-    segments[-1] = replace(segments[-1], duration_flags=segments[-1].duration_flags | 1)
+    segments = [Segment(2 * ticks, (_move(chance, ticks), _move(chance, ticks))) for _ in range(count)]
+    segments[-1] = replace(segments[-1], duration_flags=2 * ticks + 1)
     return tuple(segments)
 
 
-def _segment(chance: random.Random, ticks: int) -> Segment:
-    moves = []
-    for _ in range(2):
-        steps = chance.randrange(0, 12)
-        interval = min(ticks // 13, 50_000)
-        moves.append(
-            Move(
-                steps_dir=2 * steps + chance.randrange(2),
-                first_ticks=chance.randrange(1, interval) if steps else 0,
-                interval_q16=(interval << 16) + chance.randrange(1 << 16) if steps > 1 else 0,
-                add_q16=chance.randrange(-5000, 5000) if steps > 1 else 0,
-            )
-        )
-    return Segment(2 * ticks, tuple(moves))
+def _move(chance: random.Random, ticks: int) -> Move:
+    """A run that keeps half of the least interval clear at either end of the segment."""
+    margin = MIN_INTERVAL_TICKS // 2
+    most = min((ticks - 2 * margin) // (MIN_INTERVAL_TICKS + 20), 12)
+    steps = chance.randrange(0, most + 1)
+    steps_dir = 2 * steps + chance.randrange(2)
+    if steps == 0:
+        return Move(steps_dir)
+    first = chance.randrange(margin, margin + 20)
+    if steps == 1:
+        return Move(steps_dir, first)
+    room = min((ticks - 2 * margin - 20) // steps, 50_000)
+    interval = chance.randrange((MIN_INTERVAL_TICKS + 10) << 16, room << 16)
+    return Move(steps_dir, first, interval, chance.randrange(-(10 << 16) // steps, (10 << 16) // steps))

@@ -195,3 +195,12 @@ def test_an_advance_restarts_the_timer_for_what_is_left():
     arq.on_ack(2, FREE, 0.050)
     assert arq.deadline_s == float("inf")
     assert arq.on_time(1e9) == b""
+
+
+def test_a_reply_that_was_under_way_before_the_frame_arrived_is_not_a_sign_of_loss():
+    arq = GoBackN(0)
+    send(arq, 0.0)
+    arq.on_ack(1, FREE, 0.005)
+    send(arq, 1.0)
+    assert arq.on_ack(1, FREE, 1.004) == (Ack.REPEATED, b"")
+    assert arq.on_ack(1, FREE, 1.006)[1] != b""

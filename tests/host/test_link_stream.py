@@ -274,7 +274,7 @@ def test_a_bootloader_that_swallows_the_first_hello_is_waited_for():
 def test_a_fault_in_a_motion_is_told_with_the_exact_position(fault):
     line, plan = ModelLine(), motion(300)
     after(line, 0.2, lambda: line.device.latch(fault))
-    with pytest.raises(StreamFault, match="the device stopped: .*position exact") as caught:
+    with pytest.raises(StreamFault, match=r"the device stopped: .*position exact") as caught:
         stream_plan(line, plan)
     executed = line.device.segments_executed
     assert caught.value.exit_code == 6

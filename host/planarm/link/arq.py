@@ -8,7 +8,8 @@ receive ring can hold, and sends all of it again when
 - a reply repeats the acknowledgement that was already known while frames are in flight: the device has seen a frame it
   could not use, so one before it was lost.
 
-A repeated acknowledgement is believed once in a time-out only. Copies that turn out to be superfluous are answered with
+A repeated acknowledgement is believed once in a time-out only, and not sooner after the frame was sent than any answer
+ever came: such a reply was under way before the frame arrived. Copies that turn out to be superfluous are answered with
 repeated acknowledgements too, and without that rule each answer would cause the next copies (the "sorcerer's
 apprentice" of RFC 1123, 4.2.3.1). It is not believed at all when the reply says that the device is merely out of slots
 for the oldest frame: that frame is asked again at the time-out.
@@ -77,6 +78,7 @@ class GoBackN:
         self.counters = ArqCounters()
         self._outstanding: deque[_Outstanding] = deque()
         self._smoothed_s: float | None = None
+        self._least_s = 0.0
         self._deviation_s = 0.0
         self._timeout_s = INITIAL_TIMEOUT_S
         self._patience = 1.0  # grows with every time-out in a row
@@ -157,7 +159,9 @@ class GoBackN:
             self.counters.busy_replies += 1
             return b""
         self.counters.repeated_acks += 1
-        return self._go_back(now_s) if now_s >= self._deaf_until_s else b""
+        if now_s < self._deaf_until_s or now_s - self._outstanding[0].sent_s < self._least_s:
+            return b""
+        return self._go_back(now_s)
 
     def _go_back(self, now_s: float) -> bytes:
         copies = _LEAD
@@ -175,8 +179,9 @@ class GoBackN:
         """RFC 6298, section 2; only such a measurement ends the growth of the time-out (section 5)."""
         self._patience = 1.0
         if self._smoothed_s is None:
-            self._smoothed_s, self._deviation_s = round_trip_s, round_trip_s / 2
+            self._smoothed_s, self._deviation_s, self._least_s = round_trip_s, round_trip_s / 2, round_trip_s
         else:
             self._deviation_s += (abs(self._smoothed_s - round_trip_s) - self._deviation_s) / 4
             self._smoothed_s += (round_trip_s - self._smoothed_s) / 8
+            self._least_s = min(self._least_s, round_trip_s)
         self._timeout_s = min(max(self._smoothed_s + 4 * self._deviation_s, MIN_TIMEOUT_S), MAX_TIMEOUT_S)

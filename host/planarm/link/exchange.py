@@ -9,13 +9,12 @@ import secrets
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from planarm_wire.messages import Fault, HostMessage, Ledger, Query, Segment, State, Status
-
 from planarm.errors import DeviceFault, LinkError
 from planarm.link.position import Certainty, PositionReport, StreamError, StreamFault, moved_usteps
 from planarm.link.session import Session, SessionLimits
 from planarm.link.stream import Stream, StreamOptions, StreamProgress
 from planarm.link.transport import Transport
+from planarm_wire.messages import Fault, HostMessage, Ledger, Query, Segment, State, Status
 
 _READ_BYTES = 4096
 _REST_LIMIT_S = 5.0

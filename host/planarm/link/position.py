@@ -3,9 +3,8 @@
 from dataclasses import dataclass
 from enum import Enum
 
-from planarm_wire.messages import Ledger
-
 from planarm.errors import DeviceFault, LinkError
+from planarm_wire.messages import Ledger
 
 
 class Certainty(Enum):

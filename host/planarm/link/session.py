@@ -10,6 +10,8 @@ No I/O: the session is fed with bytes and times; `take_output` returns what is t
 
 from dataclasses import dataclass
 
+from planarm.errors import DeviceFault, LinkError
+from planarm.link.arq import Ack, ArqCounters, GoBackN
 from planarm_wire.codec import decode, encode
 from planarm_wire.errors import WireError
 from planarm_wire.framing import Frame, FrameDecoder, encode_frame
@@ -30,9 +32,6 @@ from planarm_wire.messages import (
     Status,
     Welcome,
 )
-
-from planarm.errors import DeviceFault, LinkError
-from planarm.link.arq import Ack, ArqCounters, GoBackN
 
 HELLO_PAUSES_S = (0.25, 0.5)
 HELLO_LATER_PAUSE_S = 1.25
@@ -85,6 +84,7 @@ class Session:
         self._decoder = FrameDecoder()
         self._output = bytearray()
         self._names: dict[int, str] = {}
+        self._encoded: tuple[HostMessage, int, bytes] | None = None
         self._hello_limit_s = now_s + self.limits.hello_s
         self._hellos = 0
         self._hello_due_s = now_s
@@ -227,6 +227,8 @@ class Session:
     def _check_same_device(self, status: Status) -> None:
         """Raise when `status` shows that the device forgot what it was told; every restart leads to idle."""
         assert self.welcome is not None
+        if status.state is State.FAULT:
+            return  # a device that has just restarted has nothing to fault on
         before = (self.status or self.welcome).ledger.executed_segments
         if status.ledger.executed_segments < before:
             raise LinkError(
@@ -281,8 +283,11 @@ class Session:
         )
 
     def _encode(self, message: HostMessage) -> bytes:
-        type_code, payload = encode(message)
-        return encode_frame(self._arq.next_seq, type_code, payload)
+        """Return the frame as the next one to send; the last is remembered, as it is asked about before it is sent."""
+        seq = self._arq.next_seq
+        if self._encoded is None or self._encoded[0] is not message or self._encoded[1] != seq:
+            self._encoded = (message, seq, encode_frame(seq, *encode(message)))
+        return self._encoded[2]
 
 
 def _decode(frame: Frame) -> Message:

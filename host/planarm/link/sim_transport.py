@@ -9,13 +9,13 @@ import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from planarm_wire.messages import BAUD, DIR_PINS, ENABLE_PIN, STEP_PINS, TICKS_HZ
-
 from planarm.errors import LinkError
 from planarm.link.clock import Clock
+from planarm_wire.messages import BAUD, DIR_PINS, ENABLE_PIN, STEP_PINS, TICKS_HZ
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
+
     from planarm_sim import Uno
 
 SLICE_CYCLES = 1600  # a reply is noticed at most 100 us, or 2.5 bytes at 250,000 baud, after it came
@@ -33,7 +33,8 @@ class EmulatorClock:
 
     def wait_until(self, t_s: float) -> None:
         """Run the board until its time is `t_s`."""
-        _run(self._uno, _first_cycle(t_s))
+        if self.now_s() < t_s:
+            _run(self._uno, _cycle_after(t_s))
 
 
 class SimTransport:
@@ -57,7 +58,7 @@ class SimTransport:
         uno = self.uno
         self._received += uno.serial.read()
         while not self._received and uno.cycle / TICKS_HZ < deadline_s:
-            _run(uno, min(uno.cycle + SLICE_CYCLES, _first_cycle(deadline_s)))
+            _run(uno, min(uno.cycle + SLICE_CYCLES, _cycle_after(deadline_s)))
             self._received += uno.serial.read()
         data = bytes(self._received[:max_bytes])
         del self._received[:max_bytes]
@@ -92,9 +93,9 @@ class EmulatorPins:
         self._uno.write_vcd(path, (*STEP_PINS, *DIR_PINS, ENABLE_PIN))
 
 
-def _first_cycle(t_s: float) -> float:
-    """First clock cycle at or after `t_s`; infinity stays infinity."""
-    return math.ceil(t_s * TICKS_HZ) if math.isfinite(t_s) else t_s
+def _cycle_after(t_s: float) -> float:
+    """Clock cycle that is surely not before `t_s`, whatever the rounding; infinity stays infinity."""
+    return math.floor(t_s * TICKS_HZ) + 1 if math.isfinite(t_s) else t_s
 
 
 def _run(uno: "Uno", cycle: float) -> None:

@@ -12,6 +12,9 @@ from dataclasses import dataclass
 from enum import Enum, auto
 from itertools import accumulate
 
+from planarm.errors import CertificateError, LinkError, StepsDifferError
+from planarm.link.position import moved_usteps
+from planarm.link.session import Session
 from planarm_wire.codec import encoded_bytes
 from planarm_wire.messages import (
     HOST_WINDOW_BYTES,
@@ -30,10 +33,6 @@ from planarm_wire.messages import (
     Status,
 )
 from planarm_wire.steps import duration_ticks, is_last, signed_steps
-
-from planarm.errors import CertificateError, LinkError, StepsDifferError
-from planarm.link.position import moved_usteps
-from planarm.link.session import Session
 
 FRAME_BYTES = HOST_WINDOW_BYTES // 2
 MIN_POLL_S = 0.002  # a status and its question take 1.5 ms of the line
@@ -241,9 +240,10 @@ class Stream:
             if room_bytes < 0:
                 break
             chosen.append(segment)
-        while len(chosen) > 1 and self._session.encoded_bytes(Segments(tuple(chosen))) > FRAME_BYTES:
-            chosen.pop()
-        return Segments(tuple(chosen))
+        message = Segments(tuple(chosen))
+        while len(message.segments) > 1 and self._session.encoded_bytes(message) > FRAME_BYTES:
+            message = Segments(message.segments[:-1])
+        return message
 
     @property
     def _credit(self) -> int:

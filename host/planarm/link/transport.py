@@ -13,10 +13,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 from urllib.parse import parse_qs, urlsplit
 
-from planarm_wire.messages import BAUD
-
 from planarm.errors import LinkError
 from planarm.link.clock import Clock
+from planarm_wire.messages import BAUD
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

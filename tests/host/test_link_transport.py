@@ -1,0 +1,131 @@
+"""Opening lines: every failure is one sentence that says what to do."""
+
+import array
+import errno
+import fcntl
+import grp
+import os
+import pty
+import re
+import tty
+
+import pytest
+import serial
+
+from link_echo import write_echo_image
+from planarm.errors import LinkError
+from planarm.link import released_image as images
+from planarm.link import serial_transport
+from planarm.link.transport import open_transport
+
+TIOCGEXCL = 0x80045440  # Linux, asm-generic/ioctls.h: tells whether TIOCEXCL holds
+
+
+@pytest.fixture
+def ends():
+    master, slave = pty.openpty()
+    tty.setraw(slave)
+    yield master, os.ttyname(slave)
+    os.close(slave)
+
+
+def test_an_unknown_scheme_names_the_known_ones():
+    with pytest.raises(LinkError, match=r"unknown scheme 'usb'; give a device path or one of sim://, .*socket://"):
+        open_transport("usb://1234")
+
+
+@pytest.mark.parametrize("url", ["sim://here", "sim:///x.hex", "sim://?hex=a", "sim://?image=a&speed=2"])
+def test_the_emulator_takes_an_image_and_nothing_else(url):
+    with pytest.raises(LinkError, match=r"takes sim:// or sim://\?image=PATH"):
+        open_transport(url)
+
+
+def test_a_missing_or_damaged_image_is_named(tmp_path):
+    with pytest.raises(LinkError, match=r"sim://: .*nothing\.hex"):
+        open_transport(f"sim://?image={tmp_path / 'nothing.hex'}")
+    damaged = write_echo_image(tmp_path)
+    damaged.write_text(damaged.read_text().replace(":10", ":11", 1))
+    with pytest.raises(LinkError, match=r"sim://: .*echo\.hex"):
+        open_transport(f"sim://?image={damaged}")
+
+
+def test_an_emulated_program_that_ends_is_a_broken_line(tmp_path):
+    image = tmp_path / "stops.hex"
+    image.write_text(":020000009895D1\n:00000001FF\n")  # BREAK
+    line = open_transport(f"sim://?image={image}")
+    with pytest.raises(LinkError, match=r"sim://: .*stops\.hex: the program ended at cycle"):
+        line.read(1, 1.0)
+
+
+def test_a_port_that_is_not_there():
+    with pytest.raises(LinkError, match=r"^port /dev/ttyNONE9: not found; serial ports found here: "):
+        open_transport("/dev/ttyNONE9")
+
+
+def test_a_file_that_is_no_port(tmp_path):
+    file = tmp_path / "file"
+    file.write_text("")
+    with pytest.raises(LinkError, match="cannot be opened at 250000 baud"):
+        open_transport(str(file))
+
+
+def test_a_forbidden_port_names_the_group_to_join(tmp_path, monkeypatch):
+    """The tests may run as root, who may open anything; so the system's answer is given here."""
+    device = tmp_path / "ttyACM0"
+    device.write_text("")
+
+    def refuse(*_args, **_options):
+        raise serial.SerialException(errno.EACCES, f"could not open port {device}: Permission denied")
+
+    monkeypatch.setattr(serial, "serial_for_url", refuse)
+    group = re.escape(grp.getgrgid(device.stat().st_gid).gr_name)
+    words = rf"permission denied; join the group {group} \(sudo usermod -aG {group} \$USER\) and log in again"
+    with pytest.raises(LinkError, match=words):
+        open_transport(str(device))
+
+
+def test_a_port_in_use_is_refused(ends):
+    _, path = ends
+    first = open_transport(path)
+    with pytest.raises(LinkError, match=r"in use by another program; close that program first"):
+        open_transport(path)
+    first.close()
+    open_transport(path).close()
+
+
+def test_openers_that_ask_for_no_lock_are_kept_out_too(ends):
+    _, path = ends
+    line = open_transport(path)
+    held = array.array("i", [0])
+    with open(path, "rb", buffering=0, opener=lambda name, _: os.open(name, os.O_RDONLY | os.O_NOCTTY)) as other:
+        fcntl.ioctl(other.fileno(), TIOCGEXCL, held)
+    assert held[0] == 1
+    line.close()
+
+
+def test_a_pulled_cable_is_told(ends):
+    master, path = ends
+    line = open_transport(path)
+    os.close(master)
+    with pytest.raises(LinkError, match=r"the line is gone .*was the cable pulled"):
+        line.read(10, float("inf"))
+    line.close()
+
+
+def test_a_line_that_takes_nothing_is_told(ends, monkeypatch):
+    monkeypatch.setattr(serial_transport, "WRITE_TIMEOUT_S", 0.01)
+    line = open_transport(ends[1])
+    with pytest.raises(LinkError, match=r"took no bytes for 0\.01 s"):
+        line.write(bytes(1_000_000))
+    line.close()
+
+
+def test_the_wheel_comes_before_the_checkout(tmp_path, monkeypatch):
+    wheel, checkout = tmp_path / "wheel.hex", tmp_path / "checkout.hex"
+    monkeypatch.setattr(images, "_PLACES", (wheel, checkout))
+    with pytest.raises(LinkError, match=r"not found at .*wheel\.hex or .*checkout\.hex"):
+        images.released_image()
+    checkout.write_text("")
+    assert images.released_image() == checkout
+    wheel.write_text("")
+    assert images.released_image() == wheel
