@@ -4,6 +4,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+
 from host_scenes import make_scene
 from planarm.scene import PlannerSpec, Scene, load_scene
 from planarm.scene.load import NEIGHBOURS

@@ -9,6 +9,9 @@ from math import hypot, inf
 
 import numpy as np
 import pytest
+from scipy.sparse import csr_matrix
+from scipy.sparse.csgraph import dijkstra
+
 from host_scenes import make_scene
 from planarm.scene import Obstacle
 from planarm.search.grid_search import find_path
@@ -17,8 +20,6 @@ from planarm.search.stencils import stencil
 from planarm.workspace.free_map import build_free_map
 from planarm.workspace.proof import PROVED, prove_line
 from planarm.workspace.world import FREE
-from scipy.sparse import csr_matrix
-from scipy.sparse.csgraph import dijkstra
 from search_maps import PLANNERS, drawn_map, planner
 
 MAPS = {

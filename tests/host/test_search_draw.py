@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+
 from planarm.search.draw import draw_subset, mix
 
 word = st.integers(0, 2**63 - 1)

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+
 from host_scenes import FULL_TURN, make_scene
 from planarm.scene import Obstacle
 from planarm.search.endpoints import JOIN_CELLS, endpoint

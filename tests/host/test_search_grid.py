@@ -7,14 +7,15 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.sparse import csr_matrix
+from scipy.sparse.csgraph import dijkstra
+
 from planarm.search.best_first import BUCKETS_PER_CELL, FIRST_CAPACITY
 from planarm.search.draw import draw_subset
 from planarm.search.grid_search import find_path
 from planarm.search.lattice import make_lattice, node_at
 from planarm.search.result import SearchStatus
 from planarm.search.stencils import DRAWN, stencil
-from scipy.sparse import csr_matrix
-from scipy.sparse.csgraph import dijkstra
 from search_maps import EXACT, PLANNERS, drawn_map, grid_map, planner
 
 

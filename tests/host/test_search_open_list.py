@@ -4,6 +4,7 @@ import heapq
 
 import numpy as np
 import pytest
+
 from planarm.search.open_list import BUCKET, MADE, NONE, WAITING, make_open_list, pop, with_more_room
 
 LONGEST_CM = 1.0

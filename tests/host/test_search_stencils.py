@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+
 from planarm.scene.load import NEIGHBOURS
 from planarm.search.stencils import DRAWN, cover, neighbour_counts, primitive, stencil
 

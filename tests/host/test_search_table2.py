@@ -13,6 +13,7 @@ from math import sqrt
 
 import numpy as np
 import pytest
+
 from planarm.search.grid_search import find_path
 from planarm.search.result import SearchStatus
 from planarm.workspace.free_map import build_free_map

@@ -16,12 +16,12 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from planarm_wire.kernel_cache import kernel
 
 from planarm.search.draw import draw_subset
 from planarm.search.open_list import BUCKET, MADE, NONE, WAITING, OpenList, make_open_list, pop, with_more_room
 from planarm.workspace.proof import PROVED, prove_line
 from planarm.workspace.world import ArmWorld
+from planarm_wire.kernel_cache import kernel
 
 UNSEEN = 0
 START = 255

@@ -8,6 +8,7 @@ The hash is a 32-bit multiply-xorshift mixer (two rounds of x ^= x >> 16, x *= 0
 
 import numpy as np
 from numpy.typing import NDArray
+
 from planarm_wire.kernel_cache import kernel
 
 _MASK = 0xFFFFFFFF

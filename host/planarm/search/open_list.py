@@ -13,6 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+
 from planarm_wire.kernel_cache import kernel
 
 Floats = NDArray[np.float64]
