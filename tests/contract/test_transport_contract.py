@@ -2,6 +2,7 @@
 
 import os
 import pty
+import socket
 import tty
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -51,6 +52,15 @@ def over_pty(_tmp_path) -> Iterator[Line]:
     os.close(master)
 
 
+def over_socket(_tmp_path) -> Iterator[Line]:
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        transport = open_transport(f"socket://127.0.0.1:{server.getsockname()[1]}")
+        peer, _ = server.accept()
+        with peer:
+            yield Line(transport, serve_peer=lambda: peer.sendall(peer.recv(4096)))
+            transport.close()
+
+
 def over_emulator(tmp_path) -> Iterator[Line]:
     transport = open_transport(f"sim://?image={write_echo_image(tmp_path)}")
     transport.clock.wait_until(0.001)  # the program sets its baud rate first
@@ -63,7 +73,7 @@ def over_memory(_tmp_path) -> Iterator[Line]:
     yield Line(line)
 
 
-@pytest.fixture(params=[over_loop, over_pty, over_emulator, over_memory], ids=lambda make: make.__name__)
+@pytest.fixture(params=[over_loop, over_pty, over_socket, over_emulator, over_memory], ids=lambda make: make.__name__)
 def line(request, tmp_path) -> Iterator[Line]:
     yield from request.param(tmp_path)
 

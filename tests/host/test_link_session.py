@@ -174,7 +174,7 @@ def test_a_refusal_names_the_message():
     session.send(Query(), 0.02)
     session.send(Enable(1), 0.02)
     with pytest.raises(
-        DeviceFault, match=r"refused ENABLE \(frame 2\): the command does not fit the state; state fault"
+        DeviceFault, match=r"refused ENABLE \(frame 2, state fault\): the command does not fit the state; ask"
     ):
         session.receive(reply(status(state=State.FAULT, refusal=Result.WRONG_STATE, refusal_seq=2), 3), 0.03)
 

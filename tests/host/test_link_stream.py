@@ -304,7 +304,7 @@ def test_another_version_or_specification_is_refused_before_anything_is_sent():
 def test_a_refusal_is_a_device_fault():
     line = ModelLine()
     session = open_session(line)
-    with pytest.raises(DeviceFault, match=r"refused START \(frame 1\): the command does not fit the state"):
+    with pytest.raises(DeviceFault, match=r"refused START \(frame 1, state idle\): the command does not fit the state"):
         request(line, session, Start(16_000))
 
 

@@ -30,7 +30,7 @@ class SerialTransport:
         self._descriptor = _descriptor(self._port)
         if self._descriptor is not None:
             self._port.timeout = 0
-            _lock(self._descriptor)
+            _prepare_terminal(self._port, self._descriptor)
 
     def read(self, max_bytes: int, deadline_s: float) -> bytes:
         """Return what has arrived, waiting until `deadline_s` for the first byte."""
@@ -124,10 +124,15 @@ def _descriptor(port: serial.SerialBase) -> int | None:
         return None
 
 
-def _lock(descriptor: int) -> None:
-    """Keep out openers that do not ask for pyserial's advisory lock, where the line is a terminal (TIOCEXCL)."""
+def _prepare_terminal(port: serial.SerialBase, descriptor: int) -> None:
+    """Keep out openers that do not ask for pyserial's advisory lock, and have bytes handed over without delay.
+
+    Some USB chips hold bytes for 16 ms unless asked not to; drivers that know no such setting, ptys too, say so.
+    """
     import fcntl  # noqa: PLC0415 - POSIX only
     import termios  # noqa: PLC0415
 
     if os.isatty(descriptor):
         fcntl.ioctl(descriptor, termios.TIOCEXCL)
+        with contextlib.suppress(ValueError, NotImplementedError):
+            port.set_low_latency_mode(True)

@@ -266,9 +266,10 @@ class Session:
             raise DeviceFault(f"the device stopped: {words.text}; {words.fix}")
         if status.refusal != Result.OK:
             name = self._names.get(status.refusal_seq, "a frame")
+            words = RESULT_WORDS[status.refusal]
             raise DeviceFault(
-                f"the device refused {name} (frame {status.refusal_seq}): {RESULT_WORDS[status.refusal].text};"
-                f" state {status.state.name.lower()}"
+                f"the device refused {name} (frame {status.refusal_seq}, state {status.state.name.lower()}):"
+                f" {words.text}; {words.fix}"
             )
 
     def _stall_words(self, now_s: float) -> str:
