@@ -20,6 +20,7 @@ from planarm_wire.messages import (
     Fault,
     MessageType,
     Query,
+    Result,
     Segments,
     Start,
     State,
@@ -306,6 +307,15 @@ def test_a_refusal_is_a_device_fault():
     session = open_session(line)
     with pytest.raises(DeviceFault, match=r"refused START \(frame 1, state idle\): the command does not fit the state"):
         request(line, session, Start(16_000))
+
+
+def test_a_refusal_that_leads_to_a_fault_is_told_as_the_fault():
+    line, plan = ModelLine(), motion(300)
+    after(line, 0.2, lambda: setattr(line.device, "_append", lambda _segments: Result.WRONG_STATE))
+    with pytest.raises(StreamFault, match=r"the device stopped: the segment queue ran empty.*position exact") as caught:
+        stream_plan(line, plan)
+    assert "refused SEGMENTS" in str(caught.value.__cause__)
+    assert caught.value.position.moved_usteps == planned_usteps(line.device.segments_executed)
 
 
 def test_a_ledger_that_does_not_show_the_plan_is_told():

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 from planarm.errors import DeviceFault, LinkError
 from planarm.link.position import Certainty, PositionReport, StreamError, StreamFault, moved_usteps
-from planarm.link.session import Session, SessionLimits
+from planarm.link.session import Session, SessionLimits, fault_words
 from planarm.link.stream import Stream, StreamOptions, StreamProgress
 from planarm.link.transport import Transport
 from planarm_wire.messages import Fault, HostMessage, Ledger, Query, Segment, State, Status
@@ -71,9 +71,11 @@ def stream_plan(
     except (LinkError, DeviceFault) as error:
         if stream.ledger_before is None:  # nothing was queued yet, so nothing moved
             raise
-        position = _find_position(transport, session, stream)
-        kind = StreamFault if isinstance(error, DeviceFault) else StreamError
-        raise kind(str(error), position) from error
+        position, fault = _find_position(transport, session, stream)
+        if not isinstance(error, DeviceFault):
+            raise StreamError(str(error), position) from error
+        cause = fault_words(fault) if fault is not Fault.NONE else str(error)  # a refusal may foretell a fault
+        raise StreamFault(cause, position) from error
     return _result(session, stream, transport.clock.now_s(), began_s)
 
 
@@ -116,22 +118,25 @@ def _drive(transport: Transport, session: Session, is_done: Callable[[], bool], 
         session.receive(transport.read(_READ_BYTES, deadline_s), clock.now_s())
 
 
-def _find_position(transport: Transport, session: Session, stream: Stream) -> PositionReport:
-    """Find out where the arm is after a motion broke off: ask the device again, unless it has just told."""
+def _find_position(transport: Transport, session: Session, stream: Stream) -> tuple[PositionReport, Fault]:
+    """Find out where the arm is after a motion broke off, and the fault that latched, if any.
+
+    The device is asked again, unless it has just told.
+    """
     last = session.status
     assert last is not None and session.welcome is not None, "a motion begins with a status"
     if last.state is State.FAULT:
-        return _report(Certainty.EXACT, last, stream)
+        return _report(Certainty.EXACT, last, stream), last.fault
     try:
         fresh = open_session(transport, session.limits)
         assert fresh.welcome is not None, "an open session has a welcome"
         if fresh.welcome.boot_nonce != session.welcome.boot_nonce:
-            return _report(Certainty.LOST, last, stream)
+            return _report(Certainty.LOST, last, stream), Fault.NONE
         last = _wait_for_rest(transport, fresh)
     except (LinkError, DeviceFault):
-        return _report(Certainty.BOUNDED, last, stream)
+        return _report(Certainty.BOUNDED, last, stream), Fault.NONE
     certainty = {State.RUNNING: Certainty.BOUNDED, State.IDLE: Certainty.LOST}.get(last.state, Certainty.EXACT)
-    return _report(certainty, last, stream)
+    return _report(certainty, last, stream), last.fault
 
 
 def _wait_for_rest(transport: Transport, session: Session) -> Status:

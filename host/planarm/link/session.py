@@ -262,8 +262,7 @@ class Session:
 
     def _raise_fault(self, status: Status) -> None:
         if self.guarded and status.fault != Fault.NONE:
-            words = FAULT_WORDS[status.fault]
-            raise DeviceFault(f"the device stopped: {words.text}; {words.fix}")
+            raise DeviceFault(fault_words(status.fault))
         if status.refusal != Result.OK:
             name = self._names.get(status.refusal_seq, "a frame")
             words = RESULT_WORDS[status.refusal]
@@ -289,6 +288,12 @@ class Session:
         if self._encoded is None or self._encoded[0] is not message or self._encoded[1] != seq:
             self._encoded = (message, seq, encode_frame(seq, *encode(message)))
         return self._encoded[2]
+
+
+def fault_words(fault: Fault) -> str:
+    """Return what to tell the user about a latched fault."""
+    words = FAULT_WORDS[fault]
+    return f"the device stopped: {words.text}; {words.fix}"
 
 
 def _decode(frame: Frame) -> Message:
