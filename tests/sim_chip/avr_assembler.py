@@ -77,7 +77,9 @@ def encode(mnemonic: str, operands: list[str], place: int, labels: dict[str, int
         return [0x0200 | (d - 16) << 4 | (r - 16)] if mnemonic == "muls" else [0x0100 | d // 2 << 4 | r // 2]
     if mnemonic in ("adiw", "sbiw"):
         k = value(operands[1])
-        return [(0x9600 if mnemonic == "adiw" else 0x9700) | (k & 0x30) << 2 | (register(first) - 24) // 2 << 4 | (k & 15)]
+        return [
+            (0x9600 if mnemonic == "adiw" else 0x9700) | (k & 0x30) << 2 | (register(first) - 24) // 2 << 4 | (k & 15)
+        ]
     if mnemonic in ("bset", "bclr"):
         return [(0x9408 if mnemonic == "bset" else 0x9488) | value(first) << 4]
     if mnemonic in BIT_IO:

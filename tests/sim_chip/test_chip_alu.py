@@ -5,6 +5,7 @@ Every formula below is the manual's Boolean formula for the instruction, on NumP
 
 import numpy as np
 import pytest
+
 from planarm_sim.cpu.chip import Chip, StopCause
 from sim_chip.avr_assembler import assemble
 
@@ -101,7 +102,10 @@ IMMEDIATE = {"cpi": "cp", "sbci": "sbc", "subi": "sub", "ori": "or", "andi": "an
 
 @pytest.mark.parametrize("instruction", IMMEDIATE)
 def test_constants_act_as_registers_do(instruction):
-    source = "".join(f"out 0x3F, r20\nmov r18, r16\n{instruction} r18, {k}\nin r19, 0x3F\nst X+, r18\nst X+, r19\n" for k in range(256))
+    source = "".join(
+        f"out 0x3F, r20\nmov r18, r16\n{instruction} r18, {k}\nin r19, 0x3F\nst X+, r18\nst X+, r19\n"
+        for k in range(256)
+    )
     chip = Chip(assemble("ldi r26, 0\nldi r27, 1\n" + source + "break"))
     for start in (0x00, 0x03):
         expected = EXPECTED[IMMEDIATE[instruction]](start)
@@ -150,8 +154,10 @@ def test_one_operand_over_all_values(instruction, start):
     np.testing.assert_array_equal(pairs[:, 1], expected_flags)
 
 
-PRODUCT = SWEEP.replace("st X+, r18", "st X+, r0").replace("mov r18, r16", "mov r18, r16").replace(
-    "st X+, r19", "st X+, r1\n        st X+, r19"
+PRODUCT = (
+    SWEEP.replace("st X+, r18", "st X+, r0")
+    .replace("mov r18, r16", "mov r18, r16")
+    .replace("st X+, r19", "st X+, r1\n        st X+, r19")
 )
 
 

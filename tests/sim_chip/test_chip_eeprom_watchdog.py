@@ -1,6 +1,7 @@
 """EEPROM, watchdog and reset (ATmega328P datasheet, 8.4, 8.6.3, 11.8, 11.9)."""
 
 import pytest
+
 from planarm_sim.cpu.chip import Chip, ResetCause, StopCause
 from sim_chip.avr_assembler import assemble
 
@@ -121,7 +122,13 @@ def test_the_watchdog_cannot_be_stopped_without_the_timed_sequence():
     body = "ldi r16, 0\nsts 0x60, r16"
     chip = Chip(assemble(WATCHDOG.format(vector="reti", setting=0x08, body=body)))
     assert chip.run_to(1_000_000) is StopCause.BREAK
-    stopped = Chip(assemble(WATCHDOG.format(vector="reti", setting=0x08, body="ldi r17, 0x18\n" + body.replace("sts", "sts 0x60, r17\nsts"))))
+    stopped = Chip(
+        assemble(
+            WATCHDOG.format(
+                vector="reti", setting=0x08, body="ldi r17, 0x18\n" + body.replace("sts", "sts 0x60, r17\nsts")
+            )
+        )
+    )
     assert stopped.run_to(1_000_000) is StopCause.REACHED
 
 

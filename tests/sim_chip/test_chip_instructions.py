@@ -7,6 +7,7 @@ import struct
 
 import numpy as np
 import pytest
+
 from planarm_sim.cpu.chip import Chip, StopCause
 from planarm_sim.cpu.decode import ENCODINGS
 from sim_chip.avr_assembler import assemble
@@ -173,7 +174,21 @@ def test_stores_change_the_status_register():
 def test_every_undefined_word_stops_with_its_address():
     # Words that the manual gives no meaning, and those of instructions that the ATmega328P lacks: EIJMP, EICALL,
     # ELPM, XCH, DES.
-    for word in (0x0001, 0x00FF, 0x9003, 0x9204, 0x9419, 0x9519, 0x95D8, 0x9006, 0x940B, 0x9404, 0xFF08, 0xF808, 0xFFFF):
+    for word in (
+        0x0001,
+        0x00FF,
+        0x9003,
+        0x9204,
+        0x9419,
+        0x9519,
+        0x95D8,
+        0x9006,
+        0x940B,
+        0x9404,
+        0xFF08,
+        0xF808,
+        0xFFFF,
+    ):
         chip = Chip(struct.pack("<3H", 0, 0, word))
         assert chip.run_to(100) is StopCause.BAD_OPCODE, hex(word)
         assert (chip.pc, chip.cycle) == (2, 2)

@@ -1,6 +1,7 @@
 """When interrupts are taken, in which order, and what they cost (ATmega328P datasheet, 7.7, 7.7.1 and 12.1)."""
 
 import pytest
+
 from planarm_sim.cpu.chip import Chip, StopCause
 from sim_chip.avr_assembler import assemble
 

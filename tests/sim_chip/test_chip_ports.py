@@ -1,6 +1,7 @@
 """Pins, external and pin-change interrupts (ATmega328P datasheet, chapters 13 and 14)."""
 
 import pytest
+
 from planarm_sim.cpu.chip import Chip, StopCause
 from planarm_sim.errors import PinError, UsageError
 from sim_chip.avr_assembler import assemble

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as some
+
 from planarm_sim.cpu.chip import Chip, FirstTouch, StopCause
 from planarm_sim.errors import ImageError
 from sim_chip.avr_assembler import assemble
@@ -109,7 +110,15 @@ def busy_chip() -> Chip:
 
 def outcome(chip: Chip) -> tuple:
     """Everything that can be seen from outside, and the registers."""
-    return (chip.drain_edges().tolist(), chip.drain_tx().tolist(), chip.cycle, chip.pc, chip.sreg, chip.registers.tolist(), chip.sram.tolist())
+    return (
+        chip.drain_edges().tolist(),
+        chip.drain_tx().tolist(),
+        chip.cycle,
+        chip.pc,
+        chip.sreg,
+        chip.registers.tolist(),
+        chip.sram.tolist(),
+    )
 
 
 END = 12_000
@@ -197,7 +206,11 @@ def test_the_kernel_runs_the_same_without_its_compiler():
     paths = [p for p in sys.path if p] + [str(Path(__file__).parents[1])]
     environment = os.environ | {"NUMBA_DISABLE_JIT": "1"}
     run = subprocess.run(
-        [sys.executable, "-W", "error", "-c", UNCOMPILED, json.dumps(paths)], env=environment, capture_output=True, text=True
+        [sys.executable, "-W", "error", "-c", UNCOMPILED, json.dumps(paths)],
+        env=environment,
+        capture_output=True,
+        check=False,
+        text=True,
     )
     assert run.returncode == 0, run.stderr
     chip = busy_chip()
@@ -207,7 +220,9 @@ def test_the_kernel_runs_the_same_without_its_compiler():
 
 def test_what_is_not_modelled_is_noted_once_with_its_place():
     # ADCSRA is written at word 3 and again later, SPDR read at word 6, beyond the SRAM at word 8.
-    source = "nop\nnop\nldi r16, 0x80\nsts 0x7A, r16\nnop\nin r1, 0x2E\nsts 0x7A, r16\nlds r2, 0x0A00\nlds r3, 0x7A\nbreak"
+    source = (
+        "nop\nnop\nldi r16, 0x80\nsts 0x7A, r16\nnop\nin r1, 0x2E\nsts 0x7A, r16\nlds r2, 0x0A00\nlds r3, 0x7A\nbreak"
+    )
     chip = Chip(assemble(source))
     assert chip.unmodelled() == ()
     assert chip.run_to(100) is StopCause.BREAK

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as some
+
 from planarm_sim.cpu.chip import Chip, StopCause
 from sim_chip.avr_assembler import assemble
 
@@ -67,7 +68,11 @@ class Model:
         overflow = {NORMAL: old == self.maximum, CTC: wrapped and old == self.maximum, FAST: at_top}
         self.flags |= overflow.get(self.kind, at_bottom) | matches[0] << 1 | matches[1] << 2
         self.flags |= (at_top and self.top_source == "i") << 5
-        if (self.kind == FAST and wrapped) or (self.kind == CORRECT and at_top) or (self.kind == FREQUENCY_CORRECT and at_bottom):
+        if (
+            (self.kind == FAST and wrapped)
+            or (self.kind == CORRECT and at_top)
+            or (self.kind == FREQUENCY_CORRECT and at_bottom)
+        ):
             self.ocr = list(self.buffer)
         for channel in (0, 1):
             self.drive(channel, matches[channel], wrapped, at_top, at_bottom, dual)
@@ -112,7 +117,9 @@ def toggles(com: int, kind: int, channel: int, wgm: int, wide: bool) -> int:
 
 
 def watch(chip: Chip, pins: dict[int, int]) -> list[tuple[int, int, int]]:
-    return [(int(e["cycle"]), pins[int(e["pin"])], int(e["level"])) for e in chip.drain_edges() if int(e["pin"]) in pins]
+    return [
+        (int(e["cycle"]), pins[int(e["pin"])], int(e["level"])) for e in chip.drain_edges() if int(e["pin"]) in pins
+    ]
 
 
 def compare(wide: bool, addresses: dict[str, int], pins: dict[int, int], case: dict) -> None:
@@ -133,7 +140,13 @@ def compare(wide: bool, addresses: dict[str, int], pins: dict[int, int], case: d
     later = []
     for delay, channel, value in case["writes"]:
         for part, shift in word:
-            steps.append((delay if part == word[0][0] else 0, addresses[f"ocr{channel}"] + (part == "high"), value >> shift & 0xFF))
+            steps.append(
+                (
+                    delay if part == word[0][0] else 0,
+                    addresses[f"ocr{channel}"] + (part == "high"),
+                    value >> shift & 0xFF,
+                )
+            )
         later.append((len(steps) - 1, channel, value))
     source, ends = program(steps)
     chip = Chip(assemble(source + "\nloop: nop\ncall sub\nrjmp loop\nsub: ret"))
@@ -305,17 +318,23 @@ def test_reading_ocr1a_leaves_temp_alone():
 @pytest.mark.parametrize("shift", [0, 3])
 def test_a_write_to_the_counter_blocks_the_match_at_the_next_timer_clock(shift):
     # 15.7.2: TCNT0 = OCR0A written while stopped; the match is lost, and the counter goes past it.
-    source = f"""
+    source = (
+        f"""
         ldi r16, 77
         out 0x27, r16       ; OCR0A
         out 0x26, r16       ; TCNT0 = OCR0A
         ldi r16, {2 if shift else 1}
         out 0x25, r16
-    """ + "nop\n" * 40 + "in r1, 0x15\nbreak"
+    """
+        + "nop\n" * 40
+        + "in r1, 0x15\nbreak"
+    )
     chip = Chip(assemble(source))
     chip.run_to(1000)
     assert chip.registers[1] & 2 == 0
-    moved = Chip(assemble(source.replace("out 0x26, r16", "nop")))  # the same without the write, OCR0A = 77: no match yet
+    moved = Chip(
+        assemble(source.replace("out 0x26, r16", "nop"))
+    )  # the same without the write, OCR0A = 77: no match yet
     moved.run_to(1000)
     assert moved.registers[1] & 2 == 0
     later = Chip(assemble(source.replace("out 0x26, r16", "subi r16, 1\nout 0x26, r16")))  # one clock before the match
@@ -325,7 +344,8 @@ def test_a_write_to_the_counter_blocks_the_match_at_the_next_timer_clock(shift):
 
 def test_a_write_to_one_compare_register_does_not_touch_the_other():
     # OCR1B = 60 matches once, at 61 clocks; OCR1A is rewritten all the time and never reached.
-    source = """
+    source = (
+        """
         ldi r16, 6
         out 0x04, r16
         ldi r16, 0x50
@@ -336,7 +356,10 @@ def test_a_write_to_one_compare_register_does_not_touch_the_other():
         sts 0x88, r17
         ldi r16, 1
         sts 0x81, r16       ; from cycle 14 on
-    """ + "inc r17\nsts 0x88, r17\n" * 30 + "break"
+    """
+        + "inc r17\nsts 0x88, r17\n" * 30
+        + "break"
+    )
     chip = Chip(assemble(source))
     chip.run_to(1000)
     assert [(int(e["cycle"]), int(e["pin"])) for e in chip.drain_edges()] == [(14 + 61, 2)]
@@ -418,7 +441,9 @@ def test_the_prescaler_runs_on_and_can_be_reset():
 def test_icr1_can_be_written_only_where_it_is_top():
     # 16.6.3: in the other modes it belongs to the capture unit.
     def icr_after(control_b: int) -> int:
-        source = f"ldi r16, {control_b}\nsts 0x81, r16\nldi r16, 0x33\nsts 0x87, r16\nsts 0x86, r16\nlds r1, 0x86\nbreak"
+        source = (
+            f"ldi r16, {control_b}\nsts 0x81, r16\nldi r16, 0x33\nsts 0x87, r16\nsts 0x86, r16\nlds r1, 0x86\nbreak"
+        )
         chip = Chip(assemble(source))
         chip.run_to(100)
         return int(chip.registers[1])
@@ -432,7 +457,9 @@ def test_input_capture_copies_the_counter():
     # ICP1 (PB0) rises at cycle 100; synchroniser and edge detector take 3 cycles (16.6.2, 17.2): the counter, 0 at
     # cycle 3, is captured at 103 as 100. With the noise canceller 4 cycles later.
     for control, expected in ((0x41, 100), (0xC1, 104)):
-        chip = Chip(assemble(f"ldi r16, {control}\nsts 0x81, r16\n" + "nop\n" * 200 + "lds r1, 0x86\nin r2, 0x16\nbreak"))
+        chip = Chip(
+            assemble(f"ldi r16, {control}\nsts 0x81, r16\n" + "nop\n" * 200 + "lds r1, 0x86\nin r2, 0x16\nbreak")
+        )
         chip.drive_pin(0, 0)
         chip.drive_pin(0, 1, 100)
         assert chip.run_to(10_000) is StopCause.BREAK
@@ -457,5 +484,3 @@ def test_timer_0_counts_edges_of_its_pin():
         chip.drive_pin(20, 0, 70 + 20 * n)
     chip.run_to(10_000)
     assert list(chip.registers[1:3]) == [4, 5]
-
-

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import numpy as np
-from planarm_sim.cpu.compiled import kernel  # kernel_cache: see there
-
 from planarm_sim.cpu.bus import IVSEL, read_data_space, read_io, write_data_space, write_io
+from planarm_sim.cpu.compiled import constant, kernel  # kernel_cache: see there
 from planarm_sim.cpu.flags import I
 from planarm_sim.cpu.interrupts import ENTRY_CYCLES, WAKE_CYCLES, acknowledge
 from planarm_sim.cpu.layout import (
@@ -29,7 +27,9 @@ from planarm_sim.peripherals.watchdog import restart_watchdog
 
 # Values of ACCESS. ACCESS_VALUE is the register that takes the byte read, the byte to write, the mask of a bit
 # (above it the words to skip), or the return address to push.
-NOTHING, READ, SKIP_CLEAR, SKIP_SET, WRITE, SET_BIT, CLEAR_BIT, CALL, RETURN, SLEEP, RESTART_WATCHDOG = np.arange(11)
+NOTHING, READ, SKIP_CLEAR, SKIP_SET, WRITE, SET_BIT, CLEAR_BIT, CALL, RETURN, SLEEP, RESTART_WATCHDOG = (
+    constant(n) for n in range(11)
+)
 LAST_READ = SKIP_SET
 """Accesses up to this one see the state one cycle before the instruction's end."""
 PC_MASK = 0x3FFF

@@ -8,8 +8,8 @@ instruction.
 from __future__ import annotations
 
 import numpy as np
-from planarm_sim.cpu.compiled import kernel  # kernel_cache: see there
 
+from planarm_sim.cpu.compiled import kernel  # kernel_cache: see there
 from planarm_sim.cpu.layout import (
     CYCLE,
     HORIZON,
@@ -131,7 +131,7 @@ def write_data_space(st: State, sram: Bytes, eeprom: Bytes, address: int, value:
 
 
 @kernel
-def read_io(st: State, eeprom: Bytes, address: int) -> int:
+def read_io(st: State, eeprom: Bytes, address: int) -> int:  # noqa: PLR0911 - one line per part
     """Read a general or I/O register (address below 256)."""
     if READS_PLAIN[address]:
         return int(st[address])

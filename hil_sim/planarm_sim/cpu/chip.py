@@ -151,11 +151,10 @@ class Chip:
         causes = 0 if cause == ResetCause.POWER_ON else int(old[reg.MCUSR])
         st = np.zeros_like(old)
         st[at.CONSTANTS :] = old[at.CONSTANTS :]
-        kept = (at.CYCLE, at.TX_BASE, at.TX_COUNT, at.TX_LIMIT, at.EDGE_BASE, at.EDGE_COUNT, at.EDGE_LIMIT)
-        kept += (at.RX_BASE, at.RX_HEAD, at.RX_TAIL, at.IN_BASE, at.IN_HEAD, at.IN_TAIL, at.BOOT_START)
-        kept += (at.DUE_INPUT, at.OUTSIDE_ADDRESS, at.OUTSIDE_PC, *range(at.LEVEL, at.PIPE))
-        kept += tuple(range(at.TOUCHED, at.TOUCHED + 256))
-        st[list(kept)] = old[list(kept)]
+        kept = [at.CYCLE, at.TX_BASE, at.TX_COUNT, at.TX_LIMIT, at.EDGE_BASE, at.EDGE_COUNT, at.EDGE_LIMIT]
+        kept += [at.RX_BASE, at.RX_HEAD, at.RX_TAIL, at.IN_BASE, at.IN_HEAD, at.IN_TAIL, at.BOOT_START]
+        kept += [at.OUTSIDE_ADDRESS, at.OUTSIDE_PC, *range(at.LEVEL, at.PIPE), *range(at.TOUCHED, at.TOUCHED + 256)]
+        st[kept] = old[kept]
         st[at.OVERRIDE : at.EXTERNAL] = 0
         st[at.DUE : at.DUE + at.DUE_SOURCES] = at.NEVER
         st[at.DUE_INPUT] = old[at.DUE_INPUT] if st[at.IN_HEAD] < st[at.IN_TAIL] else at.NEVER
@@ -201,7 +200,8 @@ class Chip:
         """
         if not 5 <= data_bits <= 9 or not 0 <= byte < 1 << data_bits or not bit_cycles >= 1:
             raise UsageError(
-                f"no serial frame: character {byte} in {data_bits} bits (5 to 9) at {bit_cycles} cycles per bit (1 or more)"
+                f"no serial frame: character {byte} in {data_bits} bits (5 to 9) "
+                f"at {bit_cycles} cycles per bit (1 or more)"
             )
         st = self._state
         tail = int(st[at.RX_TAIL])
@@ -289,7 +289,7 @@ class Chip:
 
     def restore(self, snapshot: Snapshot) -> None:
         """Go back to `snapshot`, of this chip or of another with any program; the same run follows."""
-        self._state = queues.allocate(np.pad(snapshot.state, (0, at.QUEUES - at.STATE_WORDS)), snapshot.queues)
+        self._state = queues.refill(self._state, snapshot.state, snapshot.queues)
         self._sram[:] = snapshot.sram
         self._eeprom[:] = snapshot.eeprom
         self._flash, self._code = snapshot.flash, snapshot.code

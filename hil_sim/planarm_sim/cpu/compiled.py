@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, TypeVar
+from typing import Any, TypeVar, cast
+
+import numpy as np
 
 from planarm_wire import kernel_cache
 
@@ -19,4 +21,9 @@ def kernel(function: F) -> F:
     compiled: Any = kernel_cache.kernel(function)
     if hasattr(compiled, "targetoptions"):  # plain Python when the compiler is switched off
         compiled.targetoptions["_nrt"] = False
-    return compiled
+    return cast("F", compiled)
+
+
+def constant(value: int) -> int:
+    """Return `value` as a number for which Numba compiles no version of its own of the functions it is passed to."""
+    return cast("int", np.int64(value))

@@ -8,11 +8,10 @@ program counter.
 
 from __future__ import annotations
 
-from planarm_sim.cpu.compiled import kernel  # kernel_cache: see there
-
 from planarm_sim.cpu import access as io
 from planarm_sim.cpu import opcodes as op
 from planarm_sim.cpu.access import access_data, note_access, take_interrupt
+from planarm_sim.cpu.compiled import kernel  # kernel_cache: see there
 from planarm_sim.cpu.events import process_events
 from planarm_sim.cpu.flags import (
     KEEP_IT,

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from planarm_sim.cpu.compiled import kernel  # kernel_cache: see there
-
 from planarm_sim.cpu.layout import (
     DUE,
     DUE_CAPTURE,

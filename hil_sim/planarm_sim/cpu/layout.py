@@ -14,6 +14,8 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from planarm_sim.cpu.compiled import constant
+
 State: TypeAlias = NDArray[np.int64]
 Bytes: TypeAlias = NDArray[np.uint8]
 
@@ -146,10 +148,9 @@ SLOPE_COUNT, SLOPE_FAST, SLOPE_DUAL = 0, 1, 2
 TOP_FIXED, TOP_OCR_A, TOP_ICR = 0, 1, 2
 AT_ONCE, AT_TOP, AT_BOTTOM, AT_MAX = 0, 1, 2, 3
 
-# NumPy integers: Numba compiles a function once more for every Python constant that is passed to it.
-TIMER0 = np.int64(PIPE + 2 * PIPE_SLOTS)
-TIMER1 = TIMER0 + _F_END
-TIMER2 = TIMER1 + _F_END
+TIMER0 = constant(PIPE + 2 * PIPE_SLOTS)
+TIMER1 = constant(TIMER0 + _F_END)
+TIMER2 = constant(TIMER1 + _F_END)
 
 TOUCHED = int(TIMER2) + _F_END
 """256 words, one per data address: 1 + PC of the first access when its part is not modelled, else 0."""

@@ -43,9 +43,13 @@ DRIVES = Queue(at.IN_BASE, 1, at.IN_HEAD, at.IN_TAIL, None)
 ALL = (TX, EDGES, RX, DRIVES)
 
 
+_EMPTY = np.empty(0, dtype=np.int64)
+
+
 def contents(st: State) -> tuple[NDArray[np.int64], ...]:
     """Copy the entries in use of every queue."""
-    return tuple(st[slice(*queue.span(st))].copy() for queue in ALL)
+    spans = [queue.span(st) for queue in ALL]
+    return tuple(st[begin:end].copy() if end > begin else _EMPTY for begin, end in spans)
 
 
 def allocate(state: State, entries: tuple[NDArray[np.int64], ...]) -> State:
@@ -57,14 +61,34 @@ def allocate(state: State, entries: tuple[NDArray[np.int64], ...]) -> State:
     base = at.QUEUES
     for queue, content, size in zip(ALL, entries, sizes, strict=True):
         st[queue.base] = base
-        st[base : base + len(content)] = content
-        if queue.head is not None:
-            st[queue.head] = 0
-        st[queue.tail] = len(content) // queue.width
         if queue.limit is not None:
             st[queue.limit] = size // queue.width - LOG_MARGIN
+        _fill(st, queue, content)
         base += size
     return st
+
+
+def refill(st: State, state: State, entries: tuple[NDArray[np.int64], ...]) -> State:
+    """Put `state`'s words and the queues' entries into `st`; returns the array to use, a larger one if need be."""
+    places = [(queue, int(st[queue.base]), int(st[queue.limit]) if queue.limit else 0) for queue in ALL]
+    ends = [base for _, base, _ in places[1:]] + [len(st)]
+    if any(base + len(c) > end for (_, base, _), end, c in zip(places, ends, entries, strict=True)):
+        return allocate(np.concatenate((state, st[len(state) : at.QUEUES])), entries)
+    st[: len(state)] = state
+    for (queue, base, limit), content in zip(places, entries, strict=True):
+        st[queue.base] = base
+        if queue.limit is not None:
+            st[queue.limit] = limit
+        _fill(st, queue, content)
+    return st
+
+
+def _fill(st: State, queue: Queue, content: NDArray[np.int64]) -> None:
+    base = int(st[queue.base])
+    st[base : base + len(content)] = content
+    if queue.head is not None:
+        st[queue.head] = 0
+    st[queue.tail] = len(content) // queue.width
 
 
 def _room(entries: int) -> int:

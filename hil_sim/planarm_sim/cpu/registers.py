@@ -42,6 +42,11 @@ IO_START, SRAM_START, SRAM_END = 0x20, 0x100, 0x900
 
 # Registers that read as they were last written, whatever the time.
 _PLAIN = (GPIOR0, GPIOR1, GPIOR2, EEDR, EEARL, EEARH, EICRA, EIMSK, PCICR, PCMSK0, PCMSK1, PCMSK2, SMCR, MCUSR, MCUCR)
-_PLAIN_TOO = (*range(DDRB, PORTB + 1), *range(DDRB + 3, PORTC + 1), *range(DDRB + 6, PORTD + 1), *range(TIMSK0, TIMSK2 + 1))
+_PLAIN_TOO = (
+    *range(DDRB, PORTB + 1),
+    *range(DDRB + 3, PORTC + 1),
+    *range(DDRB + 6, PORTD + 1),
+    *range(TIMSK0, TIMSK2 + 1),
+)
 READS_PLAIN = np.zeros(256, dtype=np.bool_)
 READS_PLAIN[[*range(32), *_PLAIN, *_PLAIN_TOO]] = True

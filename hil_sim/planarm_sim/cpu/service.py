@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from planarm_sim.cpu.compiled import kernel  # kernel_cache: see there
-
 from planarm_sim.cpu.events import process_events
 from planarm_sim.cpu.flags import I
 from planarm_sim.cpu.interrupts import lowest_bit, pending_interrupts

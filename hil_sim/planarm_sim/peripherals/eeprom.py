@@ -7,7 +7,6 @@ and the start of a write for two; erase and write takes 3.4 ms, each alone 1.8 m
 from __future__ import annotations
 
 from planarm_sim.cpu.compiled import kernel  # kernel_cache: see there
-
 from planarm_sim.cpu.layout import (
     CYCLE,
     DUE_EEPROM,

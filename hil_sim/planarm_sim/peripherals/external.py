@@ -7,7 +7,6 @@ A change of a pin acts PIPE_DELAY = 3 cycles later: latch, two synchroniser stag
 from __future__ import annotations
 
 from planarm_sim.cpu.compiled import kernel  # kernel_cache: see there
-
 from planarm_sim.cpu.layout import (
     DUE_CAPTURE,
     DUE_PIPE,

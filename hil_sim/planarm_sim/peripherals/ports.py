@@ -7,9 +7,7 @@ seen by an IN only with one instruction between them).
 
 from __future__ import annotations
 
-import numpy as np
-from planarm_sim.cpu.compiled import kernel  # kernel_cache: see there
-
+from planarm_sim.cpu.compiled import constant, kernel  # kernel_cache: see there
 from planarm_sim.cpu.layout import (
     CHANGED_AT,
     CLOCK_FALLING,
@@ -51,7 +49,7 @@ EFFECT_CLOCK0, EFFECT_CLOCK1, EFFECT_CAPTURE, EFFECT_LEVEL = 32, 64, 128, 256
 PUD = 1 << 4  # MCUCR: pull-ups off everywhere
 ICNC1, ICES1 = 1 << 7, 1 << 6  # TCCR1B
 CAPTURE_FILTER_CYCLES = 4  # the noise canceller wants four equal samples (datasheet, 16.6.2)
-PORT_B, PORT_D = np.int64(0), np.int64(2)  # NumPy integers: see `layout`
+PORT_B, PORT_D = constant(0), constant(2)
 CAPTURE_PIN, CLOCK0_PIN, CLOCK1_PIN = 1 << 0, 1 << 4, 1 << 5  # PB0, PD4, PD5
 INT0_PIN = 1 << 2  # PD2; INT1 is PD3
 

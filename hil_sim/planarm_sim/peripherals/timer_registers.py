@@ -6,8 +6,8 @@ ATmega328P datasheet, 15.9, 16.11 and 18.11. All 16-bit registers of timer 1 sha
 from __future__ import annotations
 
 import numpy as np
-from planarm_sim.cpu.compiled import kernel  # kernel_cache: see there
 
+from planarm_sim.cpu.compiled import kernel  # kernel_cache: see there
 from planarm_sim.cpu.layout import (
     AT_BOTTOM,
     AT_MAX,
@@ -156,10 +156,8 @@ def apply_control(st: State, t: int, cycle: int) -> None:
     """Act on TCCRnA and TCCRnB as they now stand: mode, outputs, clock."""
     control_a = st[st[t + F_TCCRA]]
     control_b = st[st[t + F_TCCRB]]
-    if t == TIMER1:
-        mode = MODES_16[(control_a & 3) | ((control_b >> 1) & 12)]
-    else:
-        mode = MODES_8[(control_a & 3) | ((control_b >> 1) & 4)]
+    high = control_b >> 1
+    mode = MODES_16[(control_a & 3) | (high & 12)] if t == TIMER1 else MODES_8[(control_a & 3) | (high & 4)]
     slope = mode[0]
     set_mode(st, t, slope, mode[1], mode[2], mode[3], mode[4])
     com_a = effective_com(control_a >> 6, slope, mode[5] != 0)

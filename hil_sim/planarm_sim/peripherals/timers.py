@@ -9,7 +9,6 @@ and the pin one timer clock after TCNT = OCRnx (figures 15-10, 15-11, 16-10), TO
 from __future__ import annotations
 
 from planarm_sim.cpu.compiled import kernel  # kernel_cache: see there
-
 from planarm_sim.cpu.layout import (
     AT_BOTTOM,
     AT_MAX,
@@ -77,7 +76,7 @@ def clock_phase(st: State, t: int) -> int:
 def clock_runs(st: State, t: int) -> bool:
     """Tell whether the timer counts by itself (not stopped, not on a pin, prescaler not held in reset)."""
     shift = st[t + F_SHIFT]
-    return shift == 0 or (shift > 0 and st[st[t + F_HELD]] == 0)
+    return bool(shift == 0 or (shift > 0 and st[st[t + F_HELD]] == 0))
 
 
 @kernel

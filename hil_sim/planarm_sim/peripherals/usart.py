@@ -12,9 +12,7 @@ shift register's place (20.7.4: DOR is set when its start bit is found, so the o
 
 from __future__ import annotations
 
-import numpy as np
-from planarm_sim.cpu.compiled import kernel  # kernel_cache: see there
-
+from planarm_sim.cpu.compiled import constant, kernel  # kernel_cache: see there
 from planarm_sim.cpu.layout import (
     BAUD_ORIGIN,
     BIT_FRACTION,
@@ -54,7 +52,7 @@ from planarm_sim.peripherals.ports import PORT_D, refresh_port, set_override
 RXC, TXC, UDRE, FE, DOR, UPE, U2X, MPCM = (1 << bit for bit in range(7, -1, -1))  # UCSR0A
 RXEN, TXEN, UCSZ2, RXB8, TXB8 = 1 << 4, 1 << 3, 1 << 2, 1 << 1, 1 << 0  # UCSR0B
 RXD, TXD = 1 << 0, 1 << 1  # PD0, PD1
-TXD_PIN = np.int64(2 * 8 + 1)
+TXD_PIN = constant(2 * 8 + 1)
 ENTRY_DATA, ENTRY_FE, ENTRY_UPE = 0x1FF, 1 << 9, 1 << 10
 USBS, UPM1, UPM0 = 1 << 3, 1 << 5, 1 << 4  # UCSR0C
 

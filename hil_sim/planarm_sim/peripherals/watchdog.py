@@ -6,7 +6,6 @@ Its own 128 kHz oscillator is taken as exact: 2^(11 + WDP) of its periods, 125 C
 from __future__ import annotations
 
 from planarm_sim.cpu.compiled import kernel  # kernel_cache: see there
-
 from planarm_sim.cpu.layout import (
     DUE_WATCHDOG,
     HORIZON,
