@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from host_scenes import make_scene, oracle_clearance_cm, random_obstacles
 from motion_paths import tip_path, tip_points
+from planarm.errors import TimingError
 from planarm.model.arm import Arm
 from planarm.model.kinematics import forward, inverse_2r
 from planarm.scene import Obstacle
@@ -168,3 +169,17 @@ def test_a_corner_that_nothing_proves_stays_a_stop():
     made = blend_corners(Path.through(np.array(RIGHT_ANGLE), "up"), free_map, 3.0)
     assert made.stops_s.tolist() == [20.0]
     assert made.borders_s.tolist() == [0.0, 20.0, 40.0]
+
+
+@pytest.mark.parametrize(
+    ("points", "place"),
+    [
+        ([(50.0, 0.0), (30.0, 10.0)], r"path 0.00 .* tip \(50.00, 0.00\)"),
+        # Straight legs that touch the circle of full fold, 10 cm, and that of full stretch by a rounded corner.
+        ([(-40.0, 10.001), (40.0, 10.001)], r"path 40.00 .* tip \(-?0.00, 10.00\)"),
+        ([(29.0, 40.0), (30.0, 40.01), (30.0, 30.0)], r"tip \((29|30).\d+, (39|40).\d+\)"),
+    ],
+)
+def test_full_stretch_and_full_fold_are_refused_with_their_place(points, place):
+    with pytest.raises(TimingError, match=place):
+        tip_path(points, tolerance_cm=0.002)

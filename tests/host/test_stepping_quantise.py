@@ -158,13 +158,13 @@ def test_the_bound_of_quantisation_covers_poses_off_by_half_a_micro_step():
     arm = Arm((30.0, 20.0), (0.0, 0.0), ((-pi, pi), (-pi, pi)))
     joints = [joint(), joint(usteps_per_rev=3200)]
     bound = quantisation_bound_cm(arm, joints)
-    assert bound == pytest.approx(0.525 * (50.0 / joints[0].usteps_per_rad + 20.0 / joints[1].usteps_per_rad))
+    assert bound == pytest.approx(0.545 * (50.0 / joints[0].usteps_per_rad + 20.0 / joints[1].usteps_per_rad))
     rng = np.random.default_rng(1)
     q = rng.uniform(-pi, pi, (2000, 2))
     off = q + rng.choice([-0.5, 0.5], (2000, 2)) / [one.usteps_per_rad for one in joints]
     moved = np.linalg.norm(forward(arm, off) - forward(arm, q), axis=2)
     assert moved.max() <= bound
-    assert moved.max() > 0.9 * bound * 0.5 / 0.525
+    assert moved.max() > 0.9 * bound * 0.5 / 0.545
 
 
 def test_hysteresis_is_the_way_in_half_the_reversal_time():

@@ -162,11 +162,6 @@ def test_a_path_that_is_no_number_is_refused_with_its_place():
         time_path(path, [joint(), joint()])
 
 
-def test_a_path_through_full_stretch_is_refused_with_its_place():
-    with pytest.raises(TimingError, match=r"joint 1 .* tip \(50.00, 0.00\)"):
-        time_path(tip_path([(50.0, 0.0), (30.0, 10.0)]), [joint(), joint()])
-
-
 def test_joints_and_path_must_agree_in_number():
     with pytest.raises(TimingError, match=r"2 joints, the scene 3"):
         time_path(joint_line((0.0, 0.0), (1.0, 1.0)), [joint()] * 3)

@@ -8,6 +8,7 @@ A curve that cannot be proved free is tried with half of d, and so on; a corner 
 
 import numpy as np
 
+from planarm.errors import TimingError
 from planarm.search.path import Path
 from planarm.smoothing.smooth_path import Floats, SmoothPath, TwoLinks, angle_between, joint_angles
 from planarm.workspace.free_map import FreeMap
@@ -27,6 +28,9 @@ STRAIGHT = 1e-9
 TURNING_BACK = -0.99
 """Cosine of the turn beyond which the tip goes back where it came from: a stop, so that the corner is reached."""
 
+SINGULAR_RAD = 0.01
+"""Nearer than this to full stretch or full fold, theta2 turns so sharply on the path that no timing is worth having."""
+
 
 def blend_corners(path: Path, free_map: FreeMap, tolerance_cm: float = DEFAULT_TOLERANCE_CM) -> SmoothPath:
     """Return the path with its corners rounded as much as tolerance and obstacles allow.
@@ -37,6 +41,7 @@ def blend_corners(path: Path, free_map: FreeMap, tolerance_cm: float = DEFAULT_T
         tolerance_cm: largest distance of the rounded path from a corner.
 
     Raises:
+        TimingError: the path runs into full stretch or full fold, where joint speeds have no bound.
         ValueError: the path has no point, or one that is no number; or the tolerance is not above 0.
     """
     if not tolerance_cm > 0.0:
@@ -51,7 +56,9 @@ def blend_corners(path: Path, free_map: FreeMap, tolerance_cm: float = DEFAULT_T
     for k in range(1, len(corners) - 1):
         largest = 0.5 * min(lengths[k - 1], lengths[k])
         cuts[k] = _proved_cut(corners[k], units[k - 1], units[k], largest, tolerance_cm, free_map)
-    return _assemble(links, corners, units, lengths, cuts, world.turn_start_rad)
+    smooth = _assemble(links, corners, units, lengths, cuts, world.turn_start_rad)
+    _require_bent_elbow(smooth)
+    return smooth
 
 
 def way_points(points_cm: Floats) -> Floats:
@@ -132,3 +139,26 @@ def _directions_rad(links: TwoLinks, tips_cm: Floats, turn_start_rad: float) -> 
     if np.isfinite(theta1):
         first -= 2.0 * np.pi * np.floor((theta1 - turn_start_rad) / (2.0 * np.pi))
     return np.concatenate([first, first + np.cumsum(turns)])
+
+
+def _require_bent_elbow(path: SmoothPath) -> None:
+    """Check that theta2 stays clear of 0 and pi, at the tip's least and greatest distances from the base."""
+    s = np.concatenate([path.borders_s, *(_distance_extremes(path, k) for k in range(len(path.slopes)))])
+    sines = np.abs(np.sin(path.evaluate(s).q_rad[:, 1]))
+    worst = int(np.argmin(np.nan_to_num(sines)))
+    if not sines[worst] >= np.sin(SINGULAR_RAD):
+        raise TimingError(
+            f"the elbow is not {np.degrees(SINGULAR_RAD):.2g} deg off full stretch or full fold at "
+            f"{path.place(float(s[worst]))}, where no speed of the tip is slow enough for the joints; narrow "
+            f"arm.joint_limits_deg[2], or move the task's points"
+        )
+
+
+def _distance_extremes(path: SmoothPath, k: int) -> Floats:
+    """Return s inside piece k where the tip's distance from the base is stationary: to_tip . d(tip)/ds = 0, a cubic."""
+    start, slope, bend = path.tips_cm[k] - path.links.base_cm, path.slopes[k], path.bends_per_cm[k]
+    cubic = [0.5 * bend @ bend, 1.5 * slope @ bend, slope @ slope + start @ bend, start @ slope]
+    roots = np.roots(np.trim_zeros(cubic, "f"))
+    into: Floats = np.real(roots[np.abs(np.imag(roots)) <= STRAIGHT])
+    size = path.borders_s[k + 1] - path.borders_s[k]
+    return np.asarray(path.borders_s[k] + into[(into > 0.0) & (into < size)])
