@@ -234,6 +234,13 @@ def test_what_is_not_modelled_is_noted_once_with_its_place():
     assert chip.registers[3] == 0x80
 
 
+def test_modes_that_are_not_modelled_are_noted():
+    # Power-down sleep (SM2:0 = 2) and the USART as SPI master (UMSEL0 = 3).
+    chip = Chip(assemble("ldi r16, 5\nout 0x33, r16\nldi r16, 0xC0\nsts 0xC2, r16\nsleep"))
+    chip.run_to(100)
+    assert chip.unmodelled() == (FirstTouch(0x53, "SMCR", 5), FirstTouch(0xC2, "UCSR0C", 3))
+
+
 def test_modelled_registers_leave_no_note():
     chip = busy_chip()
     chip.run_to(END)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from planarm_sim.cpu.bus import IVSEL, read_data_space, read_io, write_data_space, write_io
+from planarm_sim.cpu.bus import IVSEL, read_data_space, read_io, touch, write_data_space, write_io
 from planarm_sim.cpu.compiled import constant, kernel  # kernel_cache: see there
 from planarm_sim.cpu.flags import I
 from planarm_sim.cpu.interrupts import ENTRY_CYCLES, WAKE_CYCLES, acknowledge
@@ -73,6 +73,8 @@ def access_data(st: State, sram: Bytes, eeprom: Bytes, next_pc: int) -> int:
         return pop_return(st, sram, eeprom)
     elif access == SLEEP:
         if st[SMCR] & SLEEP_ENABLE:
+            if st[SMCR] != SLEEP_ENABLE:
+                touch(st, SMCR)  # all other modes sleep as idle mode does, with the peripherals' clocks running
             st[ASLEEP] = 1 + ((st[SMCR] >> 1) & 7)
             st[HORIZON] = 0
     else:

@@ -37,6 +37,7 @@ from planarm_sim.cpu.registers import (
     GPIOR1,
     GPIOR2,
     GTCCR,
+    ICR1H,
     MCUCR,
     MCUSR,
     OCR0B,
@@ -59,20 +60,25 @@ from planarm_sim.cpu.registers import (
     TCCR0A,
     TCCR1A,
     TCCR2A,
+    TCNT0,
+    TCNT1L,
+    TCNT2,
     TIFR0,
     TIFR2,
     TIMSK0,
     TIMSK2,
     UBRR0H,
     UCSR0A,
+    UCSR0B,
+    UCSR0C,
     UDR0,
     WDTCSR,
 )
 from planarm_sim.peripherals.eeprom import read_control, write_control
 from planarm_sim.peripherals.ports import PUD, read_pins, refresh_port, write_port
 from planarm_sim.peripherals.timer_registers import (
+    read_count8,
     read_timer1,
-    read_timer8,
     read_timer_flags,
     write_prescaler_control,
     write_timer1,
@@ -85,6 +91,8 @@ from planarm_sim.peripherals.watchdog import write_watchdog
 
 IVSEL, IVCE = 1 << 1, 1 << 0  # MCUCR
 IVCE_CYCLES = 4
+UMSEL = 3 << 6  # UCSR0C: synchronous and SPI modes, which are not modelled
+NO_REGISTER_1, NO_REGISTER_2 = 0x83, 0xC3  # gaps among timer 1's and the USART's registers
 
 # Bits that can be written, where not all of them can.
 WRITABLE = np.full(256, 0xFF, dtype=np.int64)
@@ -142,15 +150,15 @@ def read_io(st: State, eeprom: Bytes, address: int) -> int:  # noqa: PLR0911 - o
     cycle = st[CYCLE] - 1
     if PINB <= address <= PIND:
         return read_pins(st, (address - PINB) // 3, cycle)
-    if TCCR1A <= address <= OCR1BH:
+    if TCNT1L <= address <= ICR1H:
         return read_timer1(st, address, cycle)
-    if TCCR0A <= address <= OCR0B or TCCR2A <= address <= OCR2B:
-        return read_timer8(st, TIMER0 if address <= OCR0B else TIMER2, address, cycle)
+    if address in (TCNT0, TCNT2):
+        return read_count8(st, TIMER0 if address == TCNT0 else TIMER2, cycle)
     if TIFR0 <= address <= TIFR2:
         return read_timer_flags(st, address, cycle)
     if address == UDR0:
         return read_data(st)
-    if UCSR0A <= address <= UBRR0H or address in (PCIFR, EIFR, WDTCSR, GTCCR):
+    if address in (UCSR0A, UCSR0B, PCIFR, EIFR, WDTCSR):
         return int(st[address])
     if address == EECR:
         return read_control(st, cycle)
@@ -167,7 +175,7 @@ def write_io(st: State, eeprom: Bytes, address: int, value: int) -> None:
         return
     if PINB <= address <= PORTD:
         write_port(st, address, value, cycle)
-    elif TCCR1A <= address <= OCR1BH:
+    elif TCCR1A <= address <= OCR1BH and address != NO_REGISTER_1:
         write_timer1(st, address, value, cycle)
     elif address == UDR0:
         write_data(st, value, cycle)
@@ -198,8 +206,10 @@ def write_rare_io(st: State, eeprom: Bytes, address: int, value: int, cycle: int
         write_timer_flags(st, address, value, cycle)
     elif TIMSK0 <= address <= TIMSK2:
         write_timer_mask(st, address, value, cycle)
-    elif UCSR0A <= address <= UBRR0H:
+    elif UCSR0A <= address <= UBRR0H and address != NO_REGISTER_2:
         write_usart(st, address, value, cycle)
+        if address == UCSR0C and value & UMSEL:
+            touch(st, address)
     elif address in (PCIFR, EIFR):
         st[address] &= ~value
     elif address in (EIMSK, PCICR, EICRA, PCMSK0, PCMSK1, PCMSK2, SMCR, EEDR, EEARL, EEARH):

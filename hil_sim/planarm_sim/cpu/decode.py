@@ -16,8 +16,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from planarm_sim.cpu import opcodes as op
-from planarm_sim.cpu.layout import CONSTANTS
-from planarm_sim.cpu.registers import GPIOR0, GPIOR1, GPIOR2, IO_START, READS_PLAIN, SREG
+from planarm_sim.cpu.layout import CONSTANTS, TEMP
+from planarm_sim.cpu.registers import (
+    GPIOR0,
+    GPIOR1,
+    GPIOR2,
+    ICR1H,
+    IO_START,
+    OCR1AH,
+    OCR1BH,
+    READS_PLAIN,
+    SRAM_START,
+    SREG,
+    TCNT1H,
+)
 
 FLASH_BYTES = 32 * 1024
 FLASH_WORDS = FLASH_BYTES // 2
@@ -119,9 +131,16 @@ _TWO_WORDS = (op.LDS, op.STS, op.JUMP3, op.CALL)
 _SKIPS = (op.CPSE, op.SBIC, op.SBIS, op.SBRC, op.SBRS)
 _WIDE = (op.ADIW, op.SBIW)
 _RELATIVE = {op.JUMP2: 12, op.RCALL: 12, op.BRBS: 7, op.BRBC: 7}
-_ON_PLAIN_READS = {op.IN: op.MOV, op.SBIC: op.SBRC, op.SBIS: op.SBRS}
+_ON_PLAIN_READS = {op.IN: op.MOV, op.SBIC: op.SBRC, op.SBIS: op.SBRS, op.LDS: op.LDS_PLAIN}
 """What to do instead with an I/O register that always reads as last written: it is one more register."""
+_ON_PLAIN_WRITES = {op.OUT: op.MOV, op.STS: op.STS_PLAIN}
 _SREG_FORMS = {op.IN: op.IN_SREG, op.OUT: op.OUT_SREG}
+# The word of the state that a data address writes and nothing else, or -1: general registers, GPIORn, and the high
+# bytes of timer 1's registers, which wait in TEMP.
+_WRITES_WORD = np.full(0x10000, -1, dtype=np.int64)
+_WRITES_WORD[:32] = np.arange(32)
+_WRITES_WORD[[GPIOR0, GPIOR1, GPIOR2]] = (GPIOR0, GPIOR1, GPIOR2)
+_WRITES_WORD[[TCNT1H, ICR1H, OCR1AH, OCR1BH]] = TEMP
 
 
 @dataclass(frozen=True, slots=True)
@@ -172,7 +191,8 @@ def decode(flash: NDArray[np.uint8]) -> NDArray[np.int64]:
     for encoding in ENCODINGS:
         at = np.nonzero((words & encoding.mask) == encoding.value)[0]
         d, r, k = _operands(encoding, words[at], following[at], at)
-        code[at] = _specialised(encoding.operation, d, r) | (d << 8) | (r << 16) | (k << 32)
+        operation, d, k = _specialised(encoding.operation, d, r, k)
+        code[at] = operation | (d << 8) | (r << 16) | (k << 32)
         if encoding.operation in _TWO_WORDS:
             length[at] = 2
         elif encoding.operation in _SKIPS:
@@ -213,14 +233,19 @@ def _operands(encoding: Encoding, word: _Words, following: _Words, address: _Wor
     return d, r, k
 
 
-def _specialised(operation: int, d: _Words, r: _Words) -> _Words:
-    """Return the operation of each word, replaced where the I/O register that it names allows a shorter way."""
-    address = r if operation == op.IN else d
+def _specialised(operation: int, d: _Words, r: _Words, k: _Words) -> tuple[_Words, _Words, _Words]:
+    """Return operation, d and k, replaced where the data address that they name allows a shorter way."""
+    address = {op.IN: r, op.LDS: k, op.STS: k}.get(operation, d)
     result = np.full_like(d, operation)
     if operation in _ON_PLAIN_READS:
-        result[READS_PLAIN[address]] = _ON_PLAIN_READS[operation]
-    if operation == op.OUT:
-        result[np.isin(address, (GPIOR0, GPIOR1, GPIOR2))] = op.MOV
+        plain = address < SRAM_START
+        plain[plain] = READS_PLAIN[address[plain]]
+        result[plain] = _ON_PLAIN_READS[operation]
+    if operation in _ON_PLAIN_WRITES:
+        word = _WRITES_WORD[address]
+        plain = word >= 0
+        result[plain] = _ON_PLAIN_WRITES[operation]
+        d, k = (np.where(plain, word, d), k) if operation == op.OUT else (d, np.where(plain, word, k))
     if operation in _SREG_FORMS:
         result[address == SREG] = _SREG_FORMS[operation]
-    return result
+    return result, d, k

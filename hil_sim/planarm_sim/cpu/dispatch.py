@@ -333,6 +333,14 @@ def run(st: State, sram: Bytes, eeprom: Bytes, code: State, flash: Bytes, target
                 horizon = 0
             pc += 2
             cycle += 2
+        elif operation == op.LDS_PLAIN:
+            st[d] = st[k]
+            pc += 2
+            cycle += 2
+        elif operation == op.STS_PLAIN:
+            st[k] = st[d]
+            pc += 2
+            cycle += 2
         elif operation == op.LPM:
             st[d] = flash[(st[Z_LOW] | (st[Z_HIGH] << 8)) & FLASH_MASK]
             pc += 1

@@ -40,13 +40,12 @@ NAMES: dict[int, str] = {
 IO_START, SRAM_START, SRAM_END = 0x20, 0x100, 0x900
 """The data space: 32 registers, I/O and extended I/O from IO_START, 2 KiB of SRAM, nothing from SRAM_END on."""
 
-# Registers that read as they were last written, whatever the time.
-_PLAIN = (GPIOR0, GPIOR1, GPIOR2, EEDR, EEARL, EEARH, EICRA, EIMSK, PCICR, PCMSK0, PCMSK1, PCMSK2, SMCR, MCUSR, MCUCR)
-_PLAIN_TOO = (
-    *range(DDRB, PORTB + 1),
-    *range(DDRB + 3, PORTC + 1),
-    *range(DDRB + 6, PORTD + 1),
-    *range(TIMSK0, TIMSK2 + 1),
-)
+# Registers that read as they were last written, whatever the time; the general registers among them.
 READS_PLAIN = np.zeros(256, dtype=np.bool_)
-READS_PLAIN[[*range(32), *_PLAIN, *_PLAIN_TOO]] = True
+for _first, _last in (
+    *((0, 31), (DDRB, PORTB), (DDRC, PORTC), (DDRD, PORTD), (EIMSK, GPIOR0), (EEDR, TCCR0B), (OCR0A, OCR0B)),
+    *((GPIOR1, GPIOR2), (SMCR, MCUCR), (PCICR, EICRA), (PCMSK0, TIMSK2), (TCCR1A, TCCR1C), (OCR1AL, OCR1BH)),
+    *((TCCR2A, TCCR2B), (OCR2A, OCR2B), (UCSR0C, UBRR0H)),
+):
+    READS_PLAIN[_first : _last + 1] = True
+READS_PLAIN[[0x49, 0xC3]] = False  # no registers

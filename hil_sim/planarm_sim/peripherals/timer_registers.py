@@ -17,7 +17,6 @@ from planarm_sim.cpu.layout import (
     CLOCK_RISING,
     CLOCK_STOPPED,
     DUE_TIMER0,
-    F_BUFFER_A,
     F_COUNT,
     F_DUE,
     F_HELD,
@@ -182,20 +181,16 @@ def write_timer8(st: State, t: int, address: int, value: int, cycle: int) -> Non
     elif what == 2:
         write_count(st, t, value)
     else:
+        st[address] = value
         write_compare(st, t, what - 3, value)
     plan_timer(st, t)
 
 
 @kernel
-def read_timer8(st: State, t: int, address: int, cycle: int) -> int:
-    """Read a register of timer 0 or 2."""
-    what = address - st[t + F_TCCRA]
-    if what < 2:
-        return int(st[address])
-    if what == 2:
-        advance_timer(st, t, cycle)
-        return int(st[t + F_COUNT])
-    return int(st[t + F_BUFFER_A + what - 3])
+def read_count8(st: State, t: int, cycle: int) -> int:
+    """Read TCNT0 or TCNT2; all other registers of these timers read as written."""
+    advance_timer(st, t, cycle)
+    return int(st[t + F_COUNT])
 
 
 @kernel
@@ -217,6 +212,8 @@ def write_timer1(st: State, address: int, value: int, cycle: int) -> None:
     elif address == TCNT1L:
         write_count(st, TIMER1, word)
     elif address in (OCR1AL, OCR1BL):
+        st[address] = value
+        st[address + 1] = word >> 8
         write_compare(st, TIMER1, (address - OCR1AL) >> 1, word)
     elif address == ICR1L and st[TIMER1 + F_TOP_SOURCE] == TOP_ICR:
         st[TIMER1 + F_ICR] = word  # in the other modes the register belongs to input capture (16.6.3)
@@ -225,23 +222,13 @@ def write_timer1(st: State, address: int, value: int, cycle: int) -> None:
 
 @kernel
 def read_timer1(st: State, address: int, cycle: int) -> int:
-    """Read a register of timer 1; reading TCNT1L or ICR1L puts the high byte into TEMP, OCR1x does not."""
-    word = 0
+    """Read TCNT1 or ICR1: the low byte puts the high one into TEMP; OCR1x read as written, TEMP aside."""
+    word = st[TIMER1 + F_ICR]
+    if address in (TCNT1H, ICR1H):
+        return int(st[TEMP])
     if address == TCNT1L:
         advance_timer(st, TIMER1, cycle)
         word = st[TIMER1 + F_COUNT]
-    elif address == ICR1L:
-        word = st[TIMER1 + F_ICR]
-    elif address in (TCNT1H, ICR1H):
-        return int(st[TEMP])
-    elif address in (OCR1AL, OCR1AH):
-        word = st[TIMER1 + F_BUFFER_A]
-        return int(word & 0xFF if address == OCR1AL else word >> 8)
-    elif address in (OCR1BL, OCR1BH):
-        word = st[TIMER1 + F_BUFFER_A + 1]
-        return int(word & 0xFF if address == OCR1BL else word >> 8)
-    else:
-        return int(st[address])
     st[TEMP] = word >> 8
     return int(word & 0xFF)
 
