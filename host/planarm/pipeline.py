@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from planarm.analysis.step_count import MeasuredSteps, StepComparison, Waveform, compare_steps, measure_steps
-from planarm.errors import CertificateError, NoPathError, StepsDifferError
+from planarm.errors import CertificateError, NoPathError, SceneError, StepsDifferError
 from planarm.link.exchange import StreamResult, stream_plan
 from planarm.link.transport import PinTrace, Transport, open_transport
 from planarm.model.arm import Arm
@@ -30,6 +30,7 @@ from planarm.summary import summarise
 from planarm.trajectory.timing import Trajectory, time_path
 from planarm.workspace.check_task import check_task
 from planarm.workspace.free_map import FreeMap, build_free_map
+from planarm.workspace.world import elbow_sides
 from planarm_wire.messages import DIR_PINS, STEP_PINS
 
 Notice = Callable[[str, float], None]
@@ -72,15 +73,9 @@ def plan_scene(scene: Scene, notice: Notice) -> Plan:
     """
     began_s = time.perf_counter()
     notice("plan", 0.0)
-    arm = Arm.from_spec(scene.arm)
-    free_map = build_free_map(scene, scene.margin_cm + quantisation_bound_cm(arm, scene.joints))
-    check_task(scene, free_map)
-    notice("plan", 0.2)
-    found = find_path(free_map, scene.task.start_cm, scene.task.goal_cm, scene.planner)
-    if found.path is None:
-        raise NoPathError(f"{scene.source}: {found.reason}")
+    free_map, path, search_s = shortest_path(scene)
     notice("plan", 0.4)
-    smooth_path = blend_corners(found.path, free_map)
+    smooth_path = blend_corners(path, free_map)
     trajectory = time_path(smooth_path, scene.joints)
     notice("plan", 0.6)
     train = quantise(trajectory, scene.joints)
@@ -91,15 +86,43 @@ def plan_scene(scene: Scene, notice: Notice) -> Plan:
     return Plan(
         scene,
         free_map,
-        found.path,
+        path,
         smooth_path,
         trajectory,
         train,
         segments,
         certificate,
         plan_ms=1e3 * (time.perf_counter() - began_s),
-        search_ms=1e3 * found.plan_s,
+        search_ms=1e3 * search_s,
     )
+
+
+def shortest_path(scene: Scene) -> tuple[FreeMap, TipPath, float]:
+    """Search on each elbow side that the scene allows; return the shortest path, its map and the search's seconds.
+
+    The margin holds half a micro-step in every joint (docs/decisions/0005).
+
+    Raises:
+        SceneError, NoPathError: no side has a path; the first side's reason.
+    """
+    margin_cm = scene.margin_cm + quantisation_bound_cm(Arm.from_spec(scene.arm), scene.joints)
+    found: list[tuple[FreeMap, TipPath, float]] = []
+    problems: list[SceneError | NoPathError] = []
+    for side in elbow_sides(scene.arm):
+        free_map = build_free_map(scene, margin_cm, side)
+        try:
+            check_task(scene, free_map)
+        except SceneError as error:
+            problems.append(error)
+            continue
+        result = find_path(free_map, scene.task.start_cm, scene.task.goal_cm, scene.planner)
+        if result.path is None:
+            problems.append(NoPathError(f"{scene.source}: {result.reason}"))
+        else:
+            found.append((free_map, result.path, result.plan_s))
+    if not found:
+        raise problems[0]
+    return min(found, key=lambda one: one[1].length_cm)
 
 
 def stored(plan: Plan) -> StoredPlan:

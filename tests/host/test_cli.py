@@ -48,15 +48,27 @@ def test_an_error_with_json_is_one_object_on_stdout(capsys, tmp_path):
     assert "link_width_cm" in error["message"], "the closest known key is named"
 
 
-def test_a_walled_in_goal_is_exit_code_3(capsys, tmp_path):
-    """A thin polygon from the inner hole to beyond the reach, between start and goal, cuts the free space in two."""
+def test_a_wall_across_the_way_is_exit_code_3(capsys, tmp_path):
+    """A radial wall at 45 degrees, from 15 to 52 cm, stops link 1 (30 cm) on its way from 11.5 to 109.4 degrees."""
     text = (EXAMPLES / "table1_case1.toml").read_text()
-    wall = '\n[[obstacles]]\nshape = "polygon"\nvertices_cm = [[30, 25], [38, 34], [37, 35], [29, 26]]\n'
+    wall = '[[obstacles]]\nshape = "polygon"\nvertices_cm = [[11, 10], [37, 36], [36, 37], [10, 11]]\n'
     scene = tmp_path / "walled.toml"
     scene.write_text(text.replace("[task]", wall + "\n[task]"))
     code, out, _ = leave(capsys, "plan", str(scene), "-o", str(tmp_path / "x.plan"), "--json")
     assert code == 3, out
     assert not (tmp_path / "x.plan").exists()
+
+
+def test_either_elbow_takes_the_shorter_way(capsys, tmp_path):
+    text = (EXAMPLES / "table1_case1.toml").read_text()
+    lengths = {}
+    for elbow in ("up", "down", "either"):
+        scene = tmp_path / f"{elbow}.toml"
+        scene.write_text(text.replace('elbow = "up"', f'elbow = "{elbow}"'))
+        code, out, _ = leave(capsys, "plan", str(scene), "-o", str(tmp_path / "x.plan"), "--json")
+        if code == 0:
+            lengths[elbow] = json.loads(out)["path_length_cm"]
+    assert lengths["either"] == min(lengths.values())
 
 
 def test_an_unreachable_port_is_exit_code_5(capsys, tmp_path):

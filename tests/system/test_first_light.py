@@ -63,7 +63,7 @@ def test_the_trace_on_disk_holds_the_plans_steps(run):
     plan = load_plan(out / "run.plan")
     vcd = read_vcd(out / "trace.vcd")
     schedule = expand(plan.segments)
-    rises = [vcd.edges(pin)["cycle"][vcd.edges(pin)["level"] == 1] for pin in ("D9", "D10")]
+    rises = [vcd.edges[pin]["cycle"][vcd.edges[pin]["level"] == 1] for pin in ("D9", "D10")]
     begin = min(r[0] for r in rises) - min(joint.ticks[0] for joint in schedule.steps)
     for seen, joint in zip(rises, schedule.steps, strict=True):
         np.testing.assert_array_equal(seen - begin, joint.ticks)

@@ -8,6 +8,7 @@ import sys
 from pathlib import Path
 
 import pytest
+
 from planarm_sim.trace import read_vcd
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -49,4 +50,4 @@ def test_run_streams_through_a_pty_to_the_emulator(tmp_path):
 
 
 def count_rises(trace, pin):
-    return int((read_vcd(trace).edges(pin)["level"] == 1).sum())
+    return int((read_vcd(trace).edges[pin]["level"] == 1).sum())
