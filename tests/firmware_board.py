@@ -228,7 +228,8 @@ class Board:
         waiting = deque(segments)
         started = False
         free = QUEUE_SLOTS
-        while True:
+        end = self.now + lead_ticks + sum(map(duration_ticks, segments)) + 10_000_000
+        while self.now < end:
             while waiting and free:
                 self.send(Segments((waiting.popleft(),)))
                 free -= 1
@@ -241,12 +242,15 @@ class Board:
             if status.state.name != "RUNNING":
                 return status
             free = status.free_slots
+        raise AssertionError(f"the motion did not end: {status}")
 
     def ask_now(self) -> Status:
         """QUERY and return its STATUS as soon as it is there."""
         self.replies.clear()
         self.send(Query())
+        end = self.now + 2_000_000
         while not any(seq == self.seq for seq, _ in self.replies):
+            assert self.now < end, "no answer"
             self.run(2000)
         status = self.replies[-1][1]
         assert isinstance(status, Status), status

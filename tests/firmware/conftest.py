@@ -8,6 +8,7 @@ import sys
 from pathlib import Path
 
 import pytest
+
 from firmware_board import EmulatedFirmware, Firmware, NativeFirmware
 
 ROOT = Path(__file__).parents[2]

@@ -5,9 +5,10 @@ from __future__ import annotations
 from dataclasses import replace
 
 import pytest
-from firmware_board import LEAD_TICKS, Board, Delays, Firmware, NativeFirmware, Schedule, end_motion, run_of, segment_of
 from hypothesis import given, settings
 from hypothesis import strategies as st
+
+from firmware_board import LEAD_TICKS, Board, Delays, Firmware, NativeFirmware, Schedule, end_motion, run_of, segment_of
 from planarm_wire.codec import encode
 from planarm_wire.framing import encode_frame
 from planarm_wire.messages import (

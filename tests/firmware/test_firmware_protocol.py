@@ -7,6 +7,7 @@ import json
 from pathlib import Path
 
 import pytest
+
 from firmware_board import (
     ANSWER_TICKS,
     LEAD_TICKS,

@@ -7,6 +7,9 @@ import itertools
 from collections.abc import Sequence
 
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
 from firmware_board import (
     LEAD_TICKS,
     REST,
@@ -19,8 +22,6 @@ from firmware_board import (
     run_of,
     segment_of,
 )
-from hypothesis import given, settings
-from hypothesis import strategies as st
 from planarm_wire.messages import (
     DIR_PINS,
     JOINTS,

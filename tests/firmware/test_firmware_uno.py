@@ -6,6 +6,7 @@ from collections import deque
 from pathlib import Path
 
 import pytest
+
 from firmware_board import (
     LEAD_TICKS,
     Board,

@@ -11,6 +11,7 @@ import sys
 from pathlib import Path
 
 import pytest
+
 from planarm_wire.messages import SPEC_HASH
 
 FIRMWARE = Path(__file__).parents[2] / "firmware"

@@ -56,6 +56,7 @@ uint8_t serial_ring_full() { return ring_full; }
 
 }  // namespace hal
 
+// 75 cycles with entry and jump; a byte comes every 640 at the fastest.
 ISR(USART_RX_vect) {
     using namespace hal;
     const uint8_t status = UCSR0A;  // before UDR0, which moves it on
@@ -70,6 +71,7 @@ ISR(USART_RX_vect) {
     ring_head = static_cast<uint8_t>(head + 1);
 }
 
+// 58 cycles with entry and jump, 60 after the last byte; once every 640.
 ISR(USART_UDRE_vect) {
     using namespace hal;
     const uint8_t* const at = sending;
