@@ -4,6 +4,7 @@ from math import pi, radians
 
 import numpy as np
 import shapely
+
 from planarm.model.kinematics import forward
 from planarm.model.shapes import Circle, Polygon, shape_of
 from planarm.scene import ArmSpec, JointSpec, LinkSpec, Obstacle, PlannerSpec, Scene, TaskSpec, WorkspaceSpec

@@ -4,6 +4,7 @@ from math import inf, pi
 
 import numpy as np
 import pytest
+
 from host_scenes import make_scene, oracle_clearance_cm, oracle_distance_cm, random_obstacles, star_polygon
 from planarm.model.arm import Arm
 from planarm.model.collision import chain_clearance, pose_clearance_cm, segment_clearance, segment_distance2

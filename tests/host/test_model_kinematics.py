@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
+
 from planarm.model.arm import Arm
 from planarm.model.kinematics import forward, inverse_2r, tip_jacobian
 

@@ -5,6 +5,7 @@ from math import hypot, sqrt
 import numpy as np
 import pytest
 import shapely
+
 from host_scenes import star_polygon
 from planarm.model.shapes import Circle, Polygon, bounding_circle, obstacle_set, shape_of
 from planarm.scene import Obstacle

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+
 from planarm.report import curves
 from planarm.report.curves import draw_joint_angles, draw_step_rates
 

@@ -3,8 +3,9 @@
 import io
 
 import numpy as np
-from planarm.report.tables import summary_table
 from rich.console import Console
+
+from planarm.report.tables import summary_table
 
 
 def printed(summary: dict) -> list[str]:

@@ -14,6 +14,7 @@ from matplotlib.figure import Figure
 from matplotlib.image import imread
 from matplotlib.patches import Circle as DrawnCircle
 from matplotlib.patches import Polygon as DrawnPolygon
+
 from planarm.report import workspace
 from planarm.report.workspace import OBSTACLE_COLOUR, REGIONS, draw_workspace
 

@@ -7,6 +7,7 @@ import pytest
 import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
+
 from planarm.errors import SceneError
 from planarm.scene import load_scene, parse_scene, with_planner
 from planarm.scene.simple_polygon import polygon_problem

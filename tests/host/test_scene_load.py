@@ -4,6 +4,7 @@ from math import pi, radians
 from pathlib import Path
 
 import pytest
+
 from planarm.scene import Obstacle, PlannerSpec, load_scene, parse_scene, with_planner
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"

@@ -4,6 +4,7 @@ from math import pi, radians
 from pathlib import Path
 
 import pytest
+
 from host_scenes import FULL_TURN, make_scene
 from planarm.errors import SceneError
 from planarm.scene import Obstacle, load_scene

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+
 from host_scenes import FULL_TURN, make_scene, oracle_clearance_cm, random_obstacles
 from planarm.errors import SceneError
 from planarm.model.arm import Arm

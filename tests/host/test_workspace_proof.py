@@ -4,9 +4,10 @@ from math import acos, pi, radians
 
 import numpy as np
 import pytest
-from host_scenes import FULL_TURN, make_scene, random_obstacles
 from hypothesis import given, settings
 from hypothesis import strategies as st
+
+from host_scenes import FULL_TURN, make_scene, random_obstacles
 from planarm.model.arm import Arm
 from planarm.model.kinematics import forward, inverse_2r
 from planarm.scene import Obstacle

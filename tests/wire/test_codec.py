@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
+
 from planarm_wire import messages as m
 from planarm_wire.codec import decode, encode, encoded_bytes
 from planarm_wire.errors import WireError

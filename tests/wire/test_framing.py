@@ -5,6 +5,7 @@ import itertools
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+
 from planarm_wire import framing
 from planarm_wire.errors import WireError
 from planarm_wire.framing import Frame, FrameDecoder, FrameError, FrameFault, encode_frame

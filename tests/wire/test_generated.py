@@ -9,6 +9,7 @@ import sys
 from pathlib import Path
 
 import pytest
+
 from planarm_wire import generate, messages
 from planarm_wire.codec import decode, encode
 from planarm_wire.crc import crc16

@@ -7,6 +7,7 @@ import sys
 from pathlib import Path
 
 import pytest
+
 from planarm_wire import kernel_cache
 
 WIRE_FOLDER = Path(kernel_cache.__file__).parents[1]

@@ -4,6 +4,7 @@ import re
 import tomllib
 
 import pytest
+
 from planarm_wire.errors import SpecError
 from planarm_wire.spec import SPEC_PATH, load_spec, parse_spec, spec_hash
 

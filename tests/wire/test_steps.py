@@ -5,6 +5,7 @@ from math import floor
 
 from hypothesis import given, settings
 from hypothesis import strategies as st
+
 from planarm_wire import steps
 from planarm_wire.messages import Move, Segment
 

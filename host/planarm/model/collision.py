@@ -9,11 +9,11 @@ from math import inf, sqrt
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from planarm_wire.kernel_cache import kernel
 
 from planarm.model.arm import Arm
 from planarm.model.kinematics import forward
 from planarm.model.shapes import ObstacleSet
+from planarm_wire.kernel_cache import kernel
 
 
 def pose_clearance_cm(arm: Arm, q_rad: ArrayLike, obstacles: ObstacleSet) -> float:

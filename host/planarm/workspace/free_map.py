@@ -10,7 +10,6 @@ from math import acos, hypot, nan, sqrt
 
 import numpy as np
 from numpy.typing import NDArray
-from planarm_wire.kernel_cache import kernel
 
 from planarm.model.kinematics import ElbowSide
 from planarm.scene import Scene
@@ -29,6 +28,7 @@ from planarm.workspace.world import (
     theta1_at,
     theta2_at,
 )
+from planarm_wire.kernel_cache import kernel
 
 WHOLE, MIXED, BLOCKED_CELL = 0, 1, 2
 """A cell is free as a whole, or its node is free and its rest not known to be, or its node is not free."""

@@ -14,8 +14,6 @@ A line or curve is proved free by covering it with discs, found by bisection.
 
 from math import acos, asin, hypot, pi, sin, sqrt
 
-from planarm_wire.kernel_cache import kernel
-
 from planarm.model.collision import point_segment_distance2
 from planarm.model.kinematics import ROUNDING_CM
 from planarm.workspace.world import (
@@ -29,6 +27,7 @@ from planarm.workspace.world import (
     region_at,
     theta1_at,
 )
+from planarm_wire.kernel_cache import kernel
 
 # Verdicts: the whole piece is free; a pose on it is not (the counterexample is told); neither could be shown.
 PROVED, BLOCKED, UNPROVED = 0, 1, 2

@@ -10,7 +10,6 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from planarm_wire.kernel_cache import kernel
 
 from planarm.errors import SceneError
 from planarm.model.arm import Arm
@@ -18,6 +17,7 @@ from planarm.model.collision import two_link_clearance
 from planarm.model.kinematics import ROUNDING_CM, ElbowSide, turn_start_rad
 from planarm.model.shapes import ObstacleSet, obstacle_set, shape_of
 from planarm.scene import ArmSpec, Scene
+from planarm_wire.kernel_cache import kernel
 
 SINGULAR_CM = 1e-6
 """Around the base itself the direction of link 1 is not defined: with equal links the hole has this radius."""
