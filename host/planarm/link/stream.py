@@ -228,7 +228,8 @@ class Stream:
 
     def _next_message(self) -> Segments | None:
         """Return the next segments, as many as one message may hold; None when all are sent."""
-        if self._message is None and self.sent_segments < len(self._segments):
+        stale = self._message is None or self._is_long(self._message)  # stuffing changes with the frame's number
+        if stale and self.sent_segments < len(self._segments):
             self._message = self._pack()
         return self._message
 
@@ -241,9 +242,13 @@ class Stream:
                 break
             chosen.append(segment)
         message = Segments(tuple(chosen))
-        while len(message.segments) > 1 and self._session.encoded_bytes(message) > FRAME_BYTES:
+        while self._is_long(message):
             message = Segments(message.segments[:-1])
         return message
+
+    def _is_long(self, message: Segments) -> bool:
+        """Whether `message` takes more than its share of the window and can be made shorter."""
+        return len(message.segments) > 1 and self._session.encoded_bytes(message) > FRAME_BYTES
 
     @property
     def _credit(self) -> int:
