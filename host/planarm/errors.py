@@ -8,8 +8,8 @@
     ├── NoPathError       3  start and goal are fine, but no collision-free path joins them
     ├── TimingError       4  the path cannot be timed within the joints' limits
     ├── CertificateError  4  a check of the finished plan failed
-    ├── LinkError         5  the serial line or its protocol failed
-    ├── DeviceFault       6  the firmware latched a fault or refused a command
+    ├── LinkError         5  the serial line or its protocol failed; link.position.StreamError tells where the arm is
+    ├── DeviceFault       6  the firmware latched a fault or refused a command; so does link.position.StreamFault
     └── StepsDifferError  7  the executed steps are not the planned ones
 
 Every message names the cause, the place, the value, the limit and the setting to change.
