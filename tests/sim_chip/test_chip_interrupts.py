@@ -90,6 +90,14 @@ loop:   inc r20
     assert (chip.registers[20], chip.registers[21]) == (4, 5)
 
 
+@pytest.mark.parametrize("access", ["in r1, 0x15", "sbi 0x05, 0", "sts 0x88, r20", "lds r1, 0x84"])
+def test_an_access_to_io_behind_sei_does_not_lose_the_interrupt(access):
+    body = f"{NOPS}\nsei\n{access}\ninc r20\nbreak"
+    chip = Chip(assemble(PROLOGUE.replace("sei", "cli").format(vector="break", ocr=20) + body))
+    assert chip.run_to(10_000) is StopCause.BREAK
+    assert chip.registers[20] == 0
+
+
 def test_lower_vectors_come_first():
     # OCF1A, OCF1B and TOV1 are all up when interrupts are enabled: vectors 11, 12, 13 in this order.
     source = """

@@ -108,7 +108,7 @@ def touch(st: State, address: int) -> None:
 
 @kernel
 def touch_outside(st: State, address: int) -> None:
-    """Note the first access beyond the end of the SRAM."""
+    """Note the first access where there is no memory for it."""
     if st[OUTSIDE_ADDRESS] == 0:
         st[OUTSIDE_ADDRESS] = address + 1
         st[OUTSIDE_PC] = st[PC]

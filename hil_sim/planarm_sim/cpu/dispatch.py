@@ -30,7 +30,7 @@ from planarm_sim.cpu.flags import (
     sign_flags,
     subtract_flags,
 )
-from planarm_sim.cpu.layout import ACCESS, ACCESS_PC, CYCLE, HORIZON, IRQ_EARLIEST, PC, SP, SREG_BITS, Bytes, State
+from planarm_sim.cpu.layout import ACCESS, ACCESS_PC, CYCLE, HORIZON, IRQ_EARLIEST, PC, PENDING, SP, SREG_BITS, Bytes, State
 from planarm_sim.cpu.registers import SRAM_END, SRAM_START
 from planarm_sim.cpu.service import AT_BAD_OPCODE, AT_BREAK, FIRST_STOP, FLASH_WRITE, RUNNING, service
 
@@ -67,7 +67,7 @@ def run(st: State, sram: Bytes, eeprom: Bytes, code: State, flash: Bytes, target
             if st[CYCLE] >= st[HORIZON]:
                 cause = service(st, eeprom, target)
                 while RUNNING < cause < FIRST_STOP:
-                    take_interrupt(st, sram, eeprom, cause)
+                    take_interrupt(st, sram, cause)
                     cause = service(st, eeprom, target)
                 if cause != RUNNING:
                     return cause
@@ -394,8 +394,9 @@ def run(st: State, sram: Bytes, eeprom: Bytes, code: State, flash: Bytes, target
             cycle += 1
             if value & I and not sreg & I:
                 st[IRQ_EARLIEST] = cycle + 1
-                horizon = min(horizon, cycle + 1)
-                st[HORIZON] = horizon
+                if st[PENDING] != 0:
+                    st[HORIZON] = min(st[HORIZON], cycle + 1)
+                    horizon = min(horizon, cycle + 1)
             sreg = value
         elif operation == op.CBI:
             note_access(st, io.CLEAR_BIT, d, r, pc)
@@ -425,8 +426,9 @@ def run(st: State, sram: Bytes, eeprom: Bytes, code: State, flash: Bytes, target
             cycle += 1
             if d == I:
                 st[IRQ_EARLIEST] = cycle + 1
-                horizon = min(horizon, cycle + 1)
-                st[HORIZON] = horizon
+                if st[PENDING] != 0:
+                    st[HORIZON] = min(st[HORIZON], cycle + 1)
+                    horizon = min(horizon, cycle + 1)
         elif operation == op.BCLR:
             sreg &= ~d
             pc += 1
@@ -498,8 +500,9 @@ def run(st: State, sram: Bytes, eeprom: Bytes, code: State, flash: Bytes, target
             sreg |= I
             cycle += 4
             st[IRQ_EARLIEST] = cycle + 1
-            st[HORIZON] = min(st[HORIZON], cycle + 1)
-            horizon = min(horizon, cycle + 1)
+            if st[PENDING] != 0:
+                st[HORIZON] = min(st[HORIZON], cycle + 1)
+                horizon = min(horizon, cycle + 1)
         elif operation == op.BRBS:
             if sreg & d:
                 pc = k

@@ -30,6 +30,7 @@ NEVER = 1 << 62
     SREG_BITS,
     HORIZON,  # the first cycle at which the CPU loop has to look at anything beside instructions
     IRQ_EARLIEST,  # no interrupt is taken before this cycle (one instruction after SEI and RETI)
+    PENDING,  # interrupts with flag and enable set, as of the last look
     ASLEEP,  # 0 awake, else 1 + sleep mode (SM2:0)
     RESET_REQUEST,  # bits of MCUSR of a reset that a peripheral asks for
     BOOT_START,  # word address of the boot section, where vectors go when IVSEL is set
@@ -86,7 +87,7 @@ NEVER = 1 << 62
     IN_HEAD,
     IN_TAIL,
     _CPU_END,
-) = range(256, 256 + 57)
+) = range(256, 256 + 58)
 
 # --- When each source of events is due ----------------------------------------------------------------------
 (DUE_TIMER0, DUE_TIMER1, DUE_TIMER2, DUE_TX, DUE_RX, DUE_PIPE, DUE_INPUT, DUE_CAPTURE, DUE_EEPROM, DUE_WATCHDOG) = (

@@ -14,6 +14,7 @@ from planarm_sim.cpu.layout import (
     HORIZON,
     IRQ_EARLIEST,
     NEVER,
+    PENDING,
     RESET_REQUEST,
     SREG_BITS,
     TX_COUNT,
@@ -42,12 +43,12 @@ def service(st: State, eeprom: Bytes, target: int) -> int:
             return LOG_FULL
         horizon = min(due, target)
         enabled = st[SREG_BITS] & I
-        if enabled:
-            pending = pending_interrupts(st)
-            if pending:
-                if cycle >= st[IRQ_EARLIEST]:
-                    return lowest_bit(pending)
-                horizon = min(horizon, int(st[IRQ_EARLIEST]))
+        pending = pending_interrupts(st)
+        st[PENDING] = pending
+        if pending and enabled:
+            if cycle >= st[IRQ_EARLIEST]:
+                return lowest_bit(pending)
+            horizon = min(horizon, int(st[IRQ_EARLIEST]))
         if not st[ASLEEP]:
             st[HORIZON] = horizon
             return RUNNING
