@@ -309,7 +309,7 @@ class Schedule:
     def of(cls, segments: Sequence[Segment]) -> Schedule:
         ends = list(itertools.accumulate(duration_ticks(segment) for segment in segments))
         steps: tuple[list[tuple[int, int]], ...] = tuple([] for _ in range(JOINTS))
-        for segment, start in zip(segments, [0, *ends[:-1]], strict=True):
+        for segment, start in zip(segments, [0, *ends], strict=False):
             for joint, ticks in enumerate(expand_moves(segment)):
                 steps[joint].extend((start + tick, direction(segment.moves[joint])) for tick in ticks)
         return cls(steps, ends)

@@ -62,7 +62,7 @@ void motion_done() { current_state = State::READY; }
 
 void fail(Fault fault, uint32_t now_ticks) {
     motion::halt(now_ticks);
-    if (latched_fault == Fault::NONE) latched_fault = fault;
+    latched_fault = fault;
     current_state = State::FAULT;
 }
 

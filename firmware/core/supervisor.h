@@ -26,7 +26,7 @@ void apply(Command command, uint32_t now_ticks);
 // The motion came to its end.
 void motion_done();
 
-// Stops the steps and latches the fault, unless an earlier one is latched.
+// Stops the steps and latches the fault. In the fault state nothing happens that could bring another.
 void fail(wire::Fault fault, uint32_t now_ticks);
 
 }  // namespace supervisor

@@ -129,6 +129,11 @@ def test_least_interval_across_boundaries(board: Board, gap: int, fault: Fault, 
     assert status.fault is fault
 
 
+def test_a_joint_that_has_not_moved_has_rested_for_ever(board: Board) -> None:
+    status = board.ask(Segments((segment_of(500), segment_of(5000, run_of(2, first=0)))))
+    assert (status.fault, status.free_slots) == (Fault.NONE, QUEUE_SLOTS - 2)
+
+
 def test_bad_segment_in_motion_stops_the_steps(board: Board) -> None:
     board.ask(Segments((segment_of(200_000, run_of(190), run_of(90, interval=2000, positive=False)),)))
     board.send(Start(LEAD_TICKS))
@@ -237,6 +242,8 @@ def test_late_interrupts_never_give_a_wrong_step(
         scheduled = [begin + tick for tick, _ in schedule.steps[joint]]
         assert rises[joint] == scheduled[: len(rises[joint])]
     assert status.ledger.position_usteps == (len(rises[0]), len(rises[1]))
+    executed = Schedule.of(motion[: status.ledger.executed_segments])
+    assert all(len(rises[joint]) >= len(executed.steps[joint]) for joint in range(JOINTS))
     if status.fault is Fault.NONE:
         assert rises == [[begin + tick for tick, _ in joint] for joint in schedule.steps]
     else:

@@ -275,7 +275,7 @@ def test_busy_leaves_no_trace_of_the_segments(board: Board) -> None:
     early_end = segment_of(20_000, run_of(1, first=0))
     for _ in range(QUEUE_SLOTS - 1):
         board.ask(Segments((early_end,)))
-    board.ask(Segments((early_end, late_end)))
+    board.ask(Segments((late_end, early_end)))
     board.seq -= 1
     status = board.ask(Segments((early_end,)))
     assert (status.fault, status.free_slots) == (Fault.NONE, 0)

@@ -167,6 +167,24 @@ CASE(receiver_finds_every_single_damaged_bit) {
     }
 }
 
+CASE(receiver_takes_no_needless_escape) {
+    // 0x7D 0x22 would be 0x02, the type of QUERY, which needs no escape.
+    Bytes line = encode(5, 2, {});
+    line.insert(line.begin() + 2, wire::ESCAPE);
+    line[3] ^= wire::ESCAPE_XOR;
+    FrameReceiver receiver;
+    CHECK(last_event(receiver, line) == FrameReceiver::Event::DAMAGED);
+}
+
+CASE(receiver_takes_no_payload_over_the_limit) {
+    FrameReceiver receiver;
+    const Bytes longest(wire::MAX_PAYLOAD_BYTES, 1);
+    const Bytes too_long(wire::MAX_PAYLOAD_BYTES + 1, 1);
+    CHECK(last_event(receiver, encode(5, 2, too_long)) == FrameReceiver::Event::DAMAGED);
+    CHECK(last_event(receiver, encode(5, 2, longest)) == FrameReceiver::Event::FRAME);
+    CHECK(last_event(receiver, encode(5, 2, Bytes(250, 1))) == FrameReceiver::Event::DAMAGED);
+}
+
 CASE(last_tick_of_a_move_is_the_closed_form) {
     for (int i = 0; i < 20000; ++i) {
         Move move = {};
