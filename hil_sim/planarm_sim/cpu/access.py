@@ -16,7 +16,10 @@ from planarm_sim.cpu.layout import (
     CYCLE,
     HORIZON,
     IRQ_EARLIEST,
+    NOTHING_CHANGED,
     PC,
+    PENDING,
+    SOMETHING_CHANGED,
     SP,
     SREG_BITS,
     Bytes,
@@ -81,7 +84,7 @@ def access_data(st: State, sram: Bytes, eeprom: Bytes, next_pc: int) -> int:
         write_data_space(st, sram, eeprom, address, value)
         if address == SREG and value & I and not enabled:  # one instruction, as after SEI
             st[IRQ_EARLIEST] = st[CYCLE] + 1
-            st[HORIZON] = 0
+            st[HORIZON] = SOMETHING_CHANGED
     elif access == CALL:
         push_return(st, sram, value)
     elif access == RETURN:
@@ -91,7 +94,7 @@ def access_data(st: State, sram: Bytes, eeprom: Bytes, next_pc: int) -> int:
             if st[SMCR] != SLEEP_ENABLE:
                 touch(st, SMCR)  # all other modes sleep as idle mode does, with the peripherals' clocks running
             st[ASLEEP] = 1
-            st[HORIZON] = 0
+            st[HORIZON] = SOMETHING_CHANGED
     else:
         restart_watchdog(st, int(st[CYCLE]))
     return next_pc
@@ -144,5 +147,7 @@ def take_interrupt(st: State, sram: Bytes, vector: int) -> None:
     st[ASLEEP] = 0
     push_return(st, sram, int(st[PC]))
     st[SREG_BITS] &= ~I
-    acknowledge(st, vector)
+    if acknowledge(st, vector):
+        st[PENDING] &= ~(1 << vector)
+    st[HORIZON] = NOTHING_CHANGED
     st[PC] = 2 * vector + (st[BOOT_START] if st[MCUCR] & IVSEL else 0)

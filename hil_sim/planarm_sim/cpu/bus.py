@@ -17,6 +17,7 @@ from planarm_sim.cpu.layout import (
     OUTSIDE_ADDRESS,
     OUTSIDE_PC,
     PC,
+    SOMETHING_CHANGED,
     SP,
     SREG_BITS,
     TIMER0,
@@ -185,7 +186,7 @@ def write_io(st: State, eeprom: Bytes, address: int, value: int) -> None:
         st[address] = value
     else:
         write_rare_io(st, eeprom, address, value, cycle)
-        st[HORIZON] = 0
+        st[HORIZON] = SOMETHING_CHANGED
 
 
 @kernel

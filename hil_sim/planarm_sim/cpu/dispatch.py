@@ -30,7 +30,20 @@ from planarm_sim.cpu.flags import (
     sign_flags,
     subtract_flags,
 )
-from planarm_sim.cpu.layout import ACCESS, ACCESS_PC, CYCLE, HORIZON, IRQ_EARLIEST, PC, PENDING, SP, SREG_BITS, Bytes, State
+from planarm_sim.cpu.layout import (
+    ACCESS,
+    ACCESS_PC,
+    CYCLE,
+    HORIZON,
+    IRQ_EARLIEST,
+    PC,
+    PENDING,
+    SOMETHING_CHANGED,
+    SP,
+    SREG_BITS,
+    Bytes,
+    State,
+)
 from planarm_sim.cpu.registers import SRAM_END, SRAM_START
 from planarm_sim.cpu.service import AT_BAD_OPCODE, AT_BREAK, FIRST_STOP, FLASH_WRITE, RUNNING, service
 
@@ -51,6 +64,7 @@ def run(st: State, sram: Bytes, eeprom: Bytes, code: State, flash: Bytes, target
     sreg = int(st[SREG_BITS])
     sp = int(st[SP])
     horizon = cycle
+    st[HORIZON] = SOMETHING_CHANGED  # whatever was done to the chip between two runs
     while True:
         if cycle >= horizon:
             st[CYCLE] = cycle

@@ -19,6 +19,7 @@ from planarm_sim.cpu.layout import (
     IN_HEAD,
     IN_TAIL,
     NEVER,
+    SOMETHING_CHANGED,
     TIMER0,
     TIMER1,
     TIMER2,
@@ -51,7 +52,7 @@ def process_events(st: State, eeprom: Bytes, until: int) -> int:
         while st[source] != due:
             source += 1
         happen(st, eeprom, source, due)
-        st[HORIZON] = 0  # the CPU loop must look for interrupts at the next instruction
+        st[HORIZON] = SOMETHING_CHANGED  # the CPU loop must look for interrupts at the next instruction
         due = next_event(st)
     return due
 

@@ -84,8 +84,11 @@ def lowest_bit(mask: int) -> int:
 
 
 @kernel
-def acknowledge(st: State, vector: int) -> None:
-    """Clear what the hardware clears when the vector is taken; RXC, UDRE, EE_READY and low levels stay."""
+def acknowledge(st: State, vector: int) -> bool:
+    """Clear what the hardware clears when the vector is taken; False where the request stays, or may stay.
+
+    RXC, UDRE, EE_READY and low levels of INT0 and INT1 ask until their cause is gone.
+    """
     if vector <= INT1:
         st[EIFR] &= ~(1 << (vector - INT0))
     elif vector < WDT:
@@ -104,6 +107,7 @@ def acknowledge(st: State, vector: int) -> None:
         st[TIFR0] &= ~timer_flag(vector - TIMER0_COMPA)
     elif vector == USART_TX:
         st[UCSR0A] &= ~TXC
+    return INT1 < vector <= TIMER0_OVF or vector == USART_TX
 
 
 @kernel

@@ -22,6 +22,12 @@ Bytes: TypeAlias = NDArray[np.uint8]
 NEVER = 1 << 62
 """A cycle that does not come (9,000 years at 16 MHz)."""
 
+SOMETHING_CHANGED = 0
+"""A horizon in the past: events or a write may have raised interrupts, and the CPU loop has to look."""
+NOTHING_CHANGED = 1
+"""Likewise in the past, but nothing that concerns interrupts has happened since the last look."""
+UNKNOWN = -1
+
 # --- CPU ---------------------------------------------------------------------------------------------------
 (
     PC,  # word address
@@ -30,7 +36,7 @@ NEVER = 1 << 62
     SREG_BITS,
     HORIZON,  # the first cycle at which the CPU loop has to look at anything beside instructions
     IRQ_EARLIEST,  # no interrupt is taken before this cycle (one instruction after SEI and RETI)
-    PENDING,  # interrupts with flag and enable set, as of the last look
+    PENDING,  # interrupts with flag and enable set, at least; or UNKNOWN
     ASLEEP,  # 0 awake, else 1 + sleep mode (SM2:0)
     RESET_REQUEST,  # bits of MCUSR of a reset that a peripheral asks for
     BOOT_START,  # word address of the boot section, where vectors go when IVSEL is set

@@ -16,9 +16,11 @@ from planarm_sim.cpu.layout import (
     NEVER,
     PENDING,
     RESET_REQUEST,
+    SOMETHING_CHANGED,
     SREG_BITS,
     TX_COUNT,
     TX_LIMIT,
+    UNKNOWN,
     Bytes,
     State,
 )
@@ -43,12 +45,15 @@ def service(st: State, eeprom: Bytes, target: int) -> int:
             return LOG_FULL
         horizon = min(due, target)
         enabled = st[SREG_BITS] & I
-        pending = pending_interrupts(st)
-        st[PENDING] = pending
-        if pending and enabled:
-            if cycle >= st[IRQ_EARLIEST]:
-                return lowest_bit(pending)
-            horizon = min(horizon, int(st[IRQ_EARLIEST]))
+        if enabled:
+            pending = pending_interrupts(st)
+            st[PENDING] = pending
+            if pending:
+                if cycle >= st[IRQ_EARLIEST]:
+                    return lowest_bit(pending)
+                horizon = min(horizon, int(st[IRQ_EARLIEST]))
+        elif st[HORIZON] == SOMETHING_CHANGED:
+            st[PENDING] = UNKNOWN
         if not st[ASLEEP]:
             st[HORIZON] = horizon
             return RUNNING

@@ -35,6 +35,7 @@ from planarm_sim.cpu.layout import (
     PIPE_DELAY,
     PIPE_HEAD,
     PIPE_SLOTS,
+    SOMETHING_CHANGED,
     TIMER0,
     TIMER1,
     TOP_ICR,
@@ -61,7 +62,7 @@ def log_edge(st: State, cycle: int, pin: int, level: int) -> None:
     st[st[EDGE_BASE] + count] = (cycle << 8) | (pin << 1) | level
     st[EDGE_COUNT] = count + 1
     if count + 1 >= st[EDGE_LIMIT]:
-        st[HORIZON] = 0
+        st[HORIZON] = SOMETHING_CHANGED
 
 
 @kernel

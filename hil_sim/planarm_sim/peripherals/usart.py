@@ -36,6 +36,7 @@ from planarm_sim.cpu.layout import (
     RX_TAIL,
     RX_WAITING,
     RX_WIDTH,
+    SOMETHING_CHANGED,
     TX_BASE,
     TX_BIT_CYCLES,
     TX_BUFFER,
@@ -100,7 +101,7 @@ def end_frame(st: State, cycle: int) -> None:
     st[entry + 2] = st[TX_BIT_CYCLES]
     st[TX_COUNT] = count + 1
     if count + 1 >= st[TX_LIMIT]:
-        st[HORIZON] = 0
+        st[HORIZON] = SOMETHING_CHANGED
     if st[UCSR0A] & UDRE:
         st[TX_BUSY] = 0
         st[DUE_TX] = NEVER
