@@ -47,6 +47,7 @@ def build_parser() -> argparse.ArgumentParser:
     _add_run(commands)
     _add_stream(commands)
     _add_emulate(commands)
+    _add_compare(commands)
     return parser
 
 
@@ -91,6 +92,22 @@ def _add_emulate(commands: Commands[argparse.ArgumentParser]) -> None:
     command.add_argument("--vcd", metavar="FILE", help="write the pins' edges to FILE at the end")
     command.add_argument("--speed", choices=("real", "max"), default="real", help="pace of the chip's clock")
     _add_json(command)
+
+
+def _add_compare(commands: Commands[argparse.ArgumentParser]) -> None:
+    command = commands.add_parser("compare", help="compute a paper's table anew beside the published one")
+    command.add_argument("table", choices=("table2",), help="table2: A*, Modified A*, Chaos A* and CHS, two cases")
+    command.add_argument("--out", metavar="DIR", help="folder for table2.json, table2.md and pictures")
+    command.add_argument("--seeds", type=_count, default=200, metavar="N", help="draws of Chaos A* (default: 200)")
+    _add_json(command)
+
+
+def _count(text: str) -> int:
+    """Return a whole number above 0."""
+    count = int(text)
+    if count < 1:
+        raise argparse.ArgumentTypeError(f"{count} is below 1")
+    return count
 
 
 def _add_scene(command: argparse.ArgumentParser) -> None:

@@ -1,0 +1,82 @@
+"""`planarm compare table2`: a paper's table, computed anew, beside the published one."""
+
+from __future__ import annotations
+
+import argparse
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from planarm.cli.progress import progress
+from planarm.cli.scenes import tell_first_compile
+
+if TYPE_CHECKING:
+    from rich.console import Console
+    from rich.table import Table
+
+    from planarm.experiments.table2 import Table2
+    from planarm.experiments.table2_tables import TextTable
+
+
+def execute(options: argparse.Namespace) -> int:
+    """Compute the comparison, print it, and write it down where --out says."""
+    tell_first_compile("planarm")
+    from planarm.experiments.table2 import compare_table2
+    from planarm.experiments.table2_folder import write_table2
+    from planarm.experiments.table2_tables import as_json
+
+    with progress(options.json) as notice:
+        result = compare_table2(options.seeds, notice)
+        if options.out:
+            write_table2(result, Path(options.out), notice)
+    if options.json:
+        print(json.dumps(as_json(result)))
+    else:
+        _print(result, options.out)
+    return 0
+
+
+def _print(result: Table2, out: str | None) -> None:
+    from rich.console import Console
+
+    from planarm.experiments.table2_tables import assumptions, findings, tables
+
+    console = Console()
+    _print_sentences(console, "What is assumed", assumptions(result))
+    for one in tables(result):
+        console.print(_shown(one))
+    _print_sentences(console, "What is reproduced, and what is not", findings(result))
+    if out:
+        console.print(f"table2.json, table2.md and pictures: {out}")
+
+
+def _shown(one: TextTable) -> Table:
+    """Return the table for a terminal of 80 columns, the cases apart."""
+    from rich import box
+    from rich.table import Table
+
+    shown = Table(
+        title=one.title,
+        title_justify="left",
+        title_style="bold",
+        box=box.SIMPLE_HEAD,
+        padding=(0, 1, 0, 0),
+        pad_edge=False,
+    )
+    for column, name in enumerate(one.header):
+        words = column < one.words
+        shown.add_column(name, justify="left" if words else "right", no_wrap=words)
+    for before, cells in zip((one.rows[0], *one.rows), one.rows, strict=False):
+        if before[0] != cells[0]:
+            shown.add_section()
+        shown.add_row(*cells)
+    return shown
+
+
+def _print_sentences(console: Console, title: str, sentences: tuple[str, ...]) -> None:
+    from rich.padding import Padding
+
+    console.print(f"[bold]{title}[/bold]")
+    for sentence in sentences:
+        console.print(Padding(f"- {sentence}", (0, 0, 0, 2)), highlight=False)
+    console.print()

@@ -1,0 +1,1 @@
+"""The papers' tables, computed anew and set beside the published figures."""
