@@ -8,8 +8,8 @@ namespace motion {
 
 namespace {
 
-// A segment is prepared this long before its start at the earliest, so that all times in the step engine
-// compare rightly.
+// A segment is prepared this long before its start at the earliest, so that the end of what is prepared stays
+// near enough for its time to compare rightly.
 constexpr int32_t PREPARE_AHEAD_TICKS = 0x100000;
 
 // The first segment to be prepared must have come this long before its start: 0.5 ms, in which a pass of the

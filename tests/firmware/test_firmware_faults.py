@@ -198,6 +198,16 @@ def test_segments_that_come_just_before_the_end_are_in_time(board: Board) -> Non
     assert [tick - rises[0] for tick in rises] == [tick - 1000 for tick, _ in Schedule.of(motion).steps[0]]
 
 
+def test_segments_behind_a_long_rest_are_not_late(board: Board) -> None:
+    # The end of the queue is over 2^31 ticks away, which must not be taken for the past.
+    rest = segment_of(MAX_SEGMENT_TICKS)
+    board.ask(Segments((rest, rest, rest)))
+    board.ask(Start(LEAD_TICKS))
+    board.run(100_000)
+    status = board.ask(Segments((rest,)))
+    assert (status.refusal, status.free_slots) == (Result.OK, QUEUE_SLOTS - 4)
+
+
 def test_segments_that_come_too_late_end_in_an_underrun_at_the_boundary(native_firmware: NativeFirmware) -> None:
     # 2000 ticks before the end there is no time left to prepare more: all that came in time is executed, and no more.
     board = Board(native_firmware)

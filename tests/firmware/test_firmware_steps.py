@@ -26,6 +26,7 @@ from planarm_wire.messages import (
     DIR_PINS,
     JOINTS,
     MAX_INTERVAL_TICKS,
+    MAX_SEGMENT_TICKS,
     MIN_DIR_SETUP_TICKS,
     MIN_INTERVAL_TICKS,
     MIN_STEP_HIGH_TICKS,
@@ -174,6 +175,16 @@ def test_two_motions_add_up(firmware: Firmware) -> None:
     first = board.stream(motion)
     board.edges = [edge for edge in board.edges if edge.pin in DIR_PINS]
     assert_on_schedule(board, motion, board.stream(motion), before=first.ledger.position_usteps)
+
+
+def test_motion_longer_than_the_clock(native_firmware: NativeFirmware) -> None:
+    # 5 minutes of longest segments: the 32-bit clock goes round, and far starts must not be taken for past ones.
+    longest = segment_of(MAX_SEGMENT_TICKS, run_of(2, first=1000), run_of(1, first=MAX_SEGMENT_TICKS - 1))
+    motion = end_motion([longest] * 5)
+    board = Board(native_firmware, delays=Delays(pass_ticks=20_000))
+    board.get_ready()
+    status = board.stream(motion, lead_ticks=MAX_SEGMENT_TICKS, slice_ticks=100_000_000)
+    assert_on_schedule(board, motion, status)
 
 
 def test_clock_wraps_inside_a_motion(native_firmware: NativeFirmware) -> None:
