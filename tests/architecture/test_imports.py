@@ -79,6 +79,7 @@ ALLOWED: dict[str, set[str]] = {
         "planarm_wire",
     },
     "planarm.summary": {"planarm.model", "planarm.link", "planarm.pipeline", "planarm_wire"},
+    "planarm.warm_up": {"planarm.pipeline", "planarm.scene"},
     "planarm.plan_file": {
         "planarm",
         "planarm.errors",
@@ -103,6 +104,7 @@ ALLOWED: dict[str, set[str]] = {
         "planarm.experiments",
         "planarm.pipeline",
         "planarm.plan_file",
+        "planarm.warm_up",
         "planarm_sim",
         *WIRE,
     },

@@ -17,8 +17,12 @@ def execute(options: argparse.Namespace) -> int:
     from planarm.errors import CertificateError
     from planarm.pipeline import plan_scene, stored
     from planarm.plan_file import save_plan
+    from planarm.warm_up import warm_up
 
     with progress(options.json) as notice:
+        notice("kernels", 0.0)
+        warm_up()
+        notice("kernels", 1.0)
         plan = plan_scene(scene, notice)
     target = Path(options.output)
     save_plan(stored(plan), target)

@@ -15,9 +15,13 @@ def execute(options: argparse.Namespace) -> int:
     scene = chosen_scene(options)
     tell_first_compile("planarm", "planarm_sim")
     from planarm.pipeline import run_scene
+    from planarm.warm_up import warm_up
 
     out = Path(options.out or Path("out") / f"{Path(scene.source).stem}-{scene.planner.algorithm}")
     with progress(options.json) as notice:
+        notice("kernels", 0.0)
+        warm_up()
+        notice("kernels", 1.0)
         summary = run_scene(scene, options.port or scene.link.port, out, notice)
     if options.json:
         print(json.dumps(summary))
