@@ -28,7 +28,8 @@ void early_pins() {
 //   on to the next run       149; 87 and 115, DIR set after 94
 //   going idle               121; falls after 78
 // The least interval of one joint must cover a receive interrupt in progress (75), the other joint's (180),
-// one instruction of the main program after each, the arming (117) and the least low time (32): 410.
+// one instruction of the main program after each, the arming (117) and the least low time (32): 410. From one
+// run to the next the look at the timer comes after 107 and asks for the DIR setup time (320): 690.
 ISR(TIMER1_COMPA_vect) { planarm::step_engine::on_match<0>(); }
 
 ISR(TIMER1_COMPB_vect) { planarm::step_engine::on_match<1>(); }
