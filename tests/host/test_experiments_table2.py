@@ -150,6 +150,17 @@ def test_case_2_of_chs_hops_over_blocked_nodes_when_only_nodes_are_checked():
     assert any(case.free_map.region[y - row, x - column] for x, y in crossed)
 
 
+def test_only_paths_with_unproved_moves_come_nearer_than_the_margin(result):
+    """CHS in case 2 to 1.9 mm, as docs/planners.md says; the margin is 4 mm."""
+    for row in result.rows:
+        if row.planner != CHAOS.name:
+            assert row.proved.clearance_cm > 0.4
+    assert row_of(result, 2, CHS).nodes.clearance_cm == pytest.approx(0.190, abs=5e-4)
+    assert row_of(result, 2, MODIFIED).nodes.clearance_cm < 0.4
+    told = next(sentence for sentence in findings(result) if "4 mm" in sentence)
+    assert "Modified A* in case 2 to 3.74 mm, CHS in case 2 to 1.90 mm" in told
+
+
 def test_the_typical_path_of_chaos_a_star_is_near_the_median(result):
     path, seed = typical_path(load_case(1), CHAOS, "nodes", SEEDS)
     one = next(one for one in result.scatter if (one.case, one.moves, one.subset) == (1, "nodes", "run"))
@@ -169,7 +180,7 @@ def test_every_figure_reaches_the_json(result):
     first = told["rows"][0]
     assert first["published"]["length_cm"] == 72.8406
     assert first["nodes"]["length_cm"] == pytest.approx(72.84062, abs=5e-6)
-    assert {"length_cm", "time_ms"} == set(first["proved"])
+    assert {"length_cm", "time_ms", "clearance_cm"} == set(first["proved"])
     assert told["improvements"][14]["published"]["usual_rule"] == pytest.approx(63.82, abs=0.005)
     assert told["scatter"][0]["no_path_share"] == told["scatter"][0]["no_path"] / SEEDS
     assert [one["free_nodes"] for one in told["maps"]] == [2129, 2708]
@@ -180,7 +191,7 @@ def test_what_is_not_a_number_is_null_in_json_and_none_in_words(result):
     without = replace(result, scatter=(lost, *result.scatter[1:]))
     assert as_json(without)["scatter"][0]["median_cm"] is None
     assert "none" in tables(without)[-1].rows[0]
-    assert "none %" in findings(without)[3]
+    assert any("none %" in sentence for sentence in findings(without))
 
 
 def test_the_markdown_has_every_row_of_every_table(result):

@@ -8,6 +8,7 @@ seeds; where one figure has to stand for it, it is the median of the seeds that 
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from math import nan
 from statistics import median
 from time import perf_counter
@@ -17,15 +18,20 @@ import numpy as np
 
 from planarm.experiments.published import A_STAR, CASES, CHAOS, PLANNERS, TABLE2, Figures, Planner
 from planarm.experiments.scenes import table1_scene
+from planarm.model.arm import Arm
+from planarm.model.kinematics import inverse_2r
 from planarm.scene import Moves, PlannerSpec, Scene, Subset
 from planarm.search.grid_search import find_path
 from planarm.search.path import Path
 from planarm.search.result import SearchResult
 from planarm.workspace.free_map import FreeMap, build_free_map
+from planarm.workspace.world import clearances_cm
 
 SEEDS: Final = 200
 RUNS: Final = 15
 """Searches of which the median time is taken, after one that is not counted."""
+SAMPLES: Final = 400
+"""Of each move, for the clearance: at most 0.1 mm apart in the moves of these planners."""
 
 Quantity = Literal["length", "time"]
 READINGS: Final[tuple[Moves, ...]] = ("nodes", "proved")
@@ -42,6 +48,8 @@ class Ours:
     length_cm: float
     time_ms: float
     """Search alone: the map is built and the kernels are compiled."""
+    clearance_cm: float
+    """Least distance of the links' centre lines to the obstacles all along the path; NaN for Chaos A*."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -188,6 +196,14 @@ def typical_path(case: Case, planner: Planner, moves: Moves, seeds: int) -> tupl
     return path, seed
 
 
+def least_clearance_cm(case: Case, path: Path) -> float:
+    """Return how near the links' centre lines come to an obstacle along a path, by sampling each move densely."""
+    share = np.linspace(0.0, 1.0, SAMPLES)[:, None]
+    tips_cm = np.concatenate([a + share * (b - a) for a, b in pairwise(path.points_cm)])
+    q_rad = inverse_2r(Arm.from_spec(case.scene.arm), tips_cm, path.elbow)
+    return float(clearances_cm(case.free_map.world, q_rad).min())
+
+
 def improvements(rows: Sequence[Row]) -> tuple[Improvement, ...]:
     """Return the percentages against A* of the same case: of all lengths, then of all times."""
     bases = {row.case: row for row in rows if row.planner == A_STAR.name}
@@ -223,14 +239,14 @@ def _row(case: Case, planner: Planner, spread: Sequence[Scatter]) -> Row:
 def _measured(case: Case, planner: Planner, moves: Moves) -> Ours:
     """Return the length, which is the same in every run, and the median time of warm runs."""
     results = [case.search(planner, moves) for _ in range(RUNS + 1)][1:]
-    path = results[0].path
-    return Ours(path.length_cm if path else nan, 1e3 * median(result.plan_s for result in results))
+    path, time_ms = results[0].path, 1e3 * median(result.plan_s for result in results)
+    return Ours(path.length_cm, time_ms, least_clearance_cm(case, path)) if path else Ours(nan, time_ms, nan)
 
 
 def _median_of_seeds(spread: Sequence[Scatter], moves: Moves) -> Ours:
     """Return what stands for Chaos A* in the rows: its subset is drawn once a run there."""
     one = next(one for one in spread if one.moves == moves and one.subset == "run")
-    return Ours(one.median_cm, one.time_ms)
+    return Ours(one.median_cm, one.time_ms, nan)
 
 
 def _scatter(case: Case, moves: Moves, subset: Subset, seeds: int) -> Scatter:

@@ -1,6 +1,6 @@
 """The comparison of Table II in words: its tables, what is assumed, and what is not reproduced and why."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
 from math import isfinite, isnan
 from typing import Any
@@ -80,6 +80,7 @@ def findings(result: Table2) -> tuple[str, ...]:
         f"and {chs[1].published.length_cm:g}: all digits in case 1, in case 2 "
         f"{10 * (chs[1].nodes.length_cm - chs[1].published.length_cm):.2f} mm longer. Case 2's path hops over blocked "
         f"cells; proved free it is {chs[1].proved.length_cm:.4f} cm.",
+        *_collision_findings(result),
         _modified_finding(modified[0].nodes.length_cm, modified[1].nodes.length_cm),
         _chaos_finding(result),
         "Improvements: the paper divides by the new value and cuts off after two decimals; so all 16 come out. "
@@ -88,6 +89,21 @@ def findings(result: Table2) -> tuple[str, ...]:
         f"{_published_time(result, 1).usual_rule:.1f} %.",
         _time_finding([row for row in result.rows if row.planner in (A_STAR.name, CHAOS.name)]),
     )
+
+
+def _collision_findings(result: Table2) -> Iterator[str]:
+    """Name the paths under the paper's reading on which a link comes too near to an obstacle between nodes."""
+    margin_cm = {one.case: one.margin_cm for one in result.maps}
+    too_near = [
+        f"{row.planner} in case {row.case} to {10 * row.nodes.clearance_cm:.2f} mm"
+        for row in result.rows
+        if row.nodes.clearance_cm <= margin_cm[row.case]
+    ]
+    if too_near:
+        yield (
+            f"Checking only nodes lets a link's centre line come nearer to an obstacle than the margin of "
+            f"{10 * result.maps[0].margin_cm:g} mm: {', '.join(too_near)}. No proved path does."
+        )
 
 
 def _modified_finding(case1_cm: float, case2_cm: float) -> str:
