@@ -26,7 +26,7 @@ center_cm = [3.5, 3.5]
 diameter_cm = 0.5
 [task]
 start_cm = [4, 1]
-goal_cm = [2.5, 2.5]
+goal_cm = [1, 3.5]
 [[joints]]
 steps_per_rev = 200
 microsteps = 16
