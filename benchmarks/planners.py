@@ -74,7 +74,7 @@ def shown(rows: list[Cells]) -> Table:
     """Return the table for a terminal of 80 columns."""
     title = "Medians of warm runs, CPU time; scipy and networkx have 8 neighbours and their graph ready"
     table = Table(title=title, title_justify="left", box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0), pad_edge=False)
-    table.add_column("planner", no_wrap=True)
+    table.add_column("planner", no_wrap=True, max_width=18)
     table.add_column("moves", no_wrap=True)
     for name in ("length (cm)", "nodes closed", "whole call (ms)", "search (ms)", "dijkstra / search"):
         table.add_column(name, justify="right")
@@ -150,7 +150,7 @@ def measure_peers(scene: Scene, free_map: FreeMap) -> tuple[list[Cells], float]:
         ("scipy: dijkstra", "nodes", f"{length_cm:.4f}", nodes, "", digits(reference_ms), "1.00"),
     ]
     if importlib.util.find_spec("networkx") is None:
-        rows.append(("networkx: not installed", "", "", "", "", "", ""))
+        rows.append(("networkx: missing", "", "", "", "", "", ""))
     else:
         found_ms, length_cm = networkx_a_star(graph, free_map, number, start, goal)
         ratio = digits(reference_ms / found_ms)

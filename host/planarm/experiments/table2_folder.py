@@ -38,7 +38,7 @@ def _draw(case: Case, planner: Planner, seeds: int, target: Path) -> bool:
     if path is None:
         return False
     how = (
-        f"23 of {planner.neighbours} neighbours, seed {seed}"
+        f"23 of {planner.neighbours} neighbours, seed {seed} (near the median)"
         if planner is CHAOS
         else f"{planner.neighbours} neighbours"
     )
