@@ -251,6 +251,34 @@ def test_clearance_is_exact_to_the_micro_step(scene, plan):
     assert planned_cm - 0.03 <= found.value <= planned_cm
 
 
+def test_clearance_holds_between_micro_steps():
+    # Coarse steps, 1000 a turn: 0.3 cm at full reach. The oracle moves from pose to pose and looks in between.
+    fine = make_scene(CASE_1[:1], y=(0.0, 50.0))
+    joints = tuple(replace(one, microsteps=1) for one in fine.joints)
+    coarse = replace(fine, joints=joints)
+    trajectory, train, segments = planned(coarse)
+    found = next(
+        check for check in certify(coarse, trajectory, train, segments).checks if check.name.startswith("clearance")
+    )
+    made = expand(segments)
+    ticks = np.unique(np.concatenate([steps.ticks for steps in made.steps]))
+    poses = np.column_stack(
+        [
+            start
+            + np.concatenate([[0], np.cumsum(steps.directions)])[np.searchsorted(steps.ticks, ticks, side="right")]
+            for start, steps in zip(made.start_usteps, made.steps, strict=True)
+        ]
+    )
+    shares = np.linspace(0.0, 1.0, 9)[:, None, None]
+    q = ((1.0 - shares) * poses[:-1] + shares * poses[1:]) / joints[0].usteps_per_rad
+    positions = joint_positions_cm(coarse.arm.link_lengths_cm, coarse.arm.base_cm, q.reshape(-1, 2))
+    true_cm = min(
+        float(link_clearance_cm(a, b, shape_of(o)).min()) for o in coarse.obstacles for a, b in pairwise(positions)
+    )
+    assert coarse.margin_cm <= found.value <= true_cm
+    assert found.value >= true_cm - 0.5 * (50.0 + 20.0) / joints[0].usteps_per_rad
+
+
 def test_tighter_joint_limits_turn_it_red_and_rounding_amber(scene, plan):
     made = expand(plan[2])
     steps = np.concatenate([[made.start_usteps[0]], made.start_usteps[0] + np.cumsum(made.steps[0].directions)])

@@ -97,6 +97,13 @@ def test_segments_must_not_be_shorter_than_the_line_takes_to_bring_them(slower):
     assert verdict_of(checks, "ahead of the line") == ("green" if slower else "red")
 
 
+def test_a_burst_of_short_segments_cannot_be_sent_before_there_is_room():
+    # The line is idle for seconds, but the device holds 32 segments and no more.
+    long, short = (10**6, Move(3, 1000), REST), (4000, Move(3, 1000), REST)
+    assert verdict_of(check_wire(plan_of(*[long] * 40, *[short] * 31)), "ahead of the line") == "green"
+    assert verdict_of(check_wire(plan_of(*[long] * 40, *[short] * 100)), "ahead of the line") == "red"
+
+
 @pytest.mark.parametrize(
     ("segment", "words"),
     [

@@ -2,8 +2,8 @@
 
 Each step has a window of allowed ticks. In real numbers T is a quadratic in n; `best_polynomial` finds the one
 whose largest error, in window widths, is least. Its I and A are rounded to integers, and only the exact expansion of
-these decides: it leaves a range for `first`, or none. Where the quadratic is inside all windows but its first or last
-interval is too short, as when a joint goes on at its top speed, that interval is held at its limit and the rest fitted.
+these decides: it leaves a range for `first`, or none. Where the quadratic is inside all windows but an interval is too
+short, as when a joint goes on at its top speed, the first interval is held at its limit and the rest fitted.
 """
 
 from math import floor
@@ -38,19 +38,16 @@ def fit_run(low: Ticks, high: Ticks, least_interval: int) -> Fit:
     for n in range(steps):
         if low[n] > high[n]:
             return False, 0, 0, 0
-    shortest = least_interval * ONE_Q16
     if steps < 3:
         # Any interval between the steps' windows; with one step, none.
         apart = max(least_interval, (low[-1] + high[-1] - low[0] - high[0]) // 2) if steps == 2 else 0
         return placed(low, high, least_interval, apart * ONE_Q16, 0)
-    inside, interval, add = False, 0, 0
-    held, reverse = 0, False
+    inside, interval, add, held = False, 0, 0, 0
     for _ in range(2):
-        inside, interval, add = fitted(low, high, held, reverse)
-        last_interval = interval + (steps - 2) * add
-        if not inside or min(interval, last_interval) >= shortest:
+        inside, interval, add = fitted(low, high, held)
+        if not inside or min(interval, interval + (steps - 2) * add) >= least_interval * ONE_Q16:
             break
-        held, reverse = least_interval, last_interval < interval
+        held = least_interval
     return placed(low, high, least_interval, interval, add) if inside else (False, 0, 0, 0)
 
 
@@ -74,21 +71,18 @@ def placed(low: Ticks, high: Ticks, least_interval: int, interval: int, add: int
 
 
 @kernel
-def fitted(low: Ticks, high: Ticks, held: int, reverse: bool) -> tuple[bool, int, int]:
+def fitted(low: Ticks, high: Ticks, held: int) -> tuple[bool, int, int]:
     """Return (inside, interval_q16, add_q16) of the best quadratic through three or more windows.
 
     With `held` > 0 the first interval is that, and only the add is fitted, 0 or more: what the held interval leaves of
     the times is a straight line over n (n - 1) / 2. Steps 0 and 1 share its zero and become one point, in both windows.
-    With `reverse` it is the last interval that is held: in reversed time it comes first.
     """
     steps = low.shape[0]
     at, center, half = np.empty(steps), np.empty(steps), np.empty(steps)
     for n in range(steps):
         # The real time of a step, between low and high + 1, is rounded down.
-        center[n] = -0.5 * (low[steps - 1 - n] + high[steps - 1 - n] + 1) if reverse else 0.5 * (low[n] + high[n] + 1)
-        half[n] = 0.5 * (high[steps - 1 - n] + 1 - low[steps - 1 - n]) if reverse else 0.5 * (high[n] + 1 - low[n])
+        center[n], half[n] = 0.5 * (low[n] + high[n] + 1) - held * n, 0.5 * (high[n] + 1 - low[n])
         at[n] = 0.5 * n * (n - 1.0) if held > 0 else n
-        center[n] -= held * n
     skipped = 0
     if held > 0:
         skipped = 1
@@ -96,14 +90,11 @@ def fitted(low: Ticks, high: Ticks, held: int, reverse: bool) -> tuple[bool, int
         top = min(center[0] + half[0], center[1] + half[1])
         center[1], half[1] = 0.5 * (bottom + top), max(0.5, 0.5 * (top - bottom))
     inside, nodes, newton = best_polynomial(at[skipped:], center[skipped:], half[skipped:], 2 - skipped)
-    if held == 0:
-        # c0 + c1 (n - n0) + c2 (n - n0) (n - n1), written with n and n (n - 1) / 2
-        interval, add = newton[1] + newton[2] * (1.0 - nodes[0] - nodes[1]), 2.0 * newton[2]
-        add_q16 = floor(add * ONE_Q16 + 0.5)
-        # What rounding A bends is taken back by I, so that both ends of the run stay.
-        bent = add - add_q16 / ONE_Q16
-        return inside, floor((interval + 0.5 * bent * (steps - 2)) * ONE_Q16 + 0.5), add_q16
-    add_q16 = max(0, floor(newton[1] * ONE_Q16 + 0.5))
-    if reverse:
-        return inside, held * ONE_Q16 + (steps - 2) * add_q16, -add_q16
-    return inside, held * ONE_Q16, add_q16
+    if held > 0:
+        return inside, held * ONE_Q16, max(0, floor(newton[1] * ONE_Q16 + 0.5))
+    # c0 + c1 (n - n0) + c2 (n - n0) (n - n1), written with n and n (n - 1) / 2
+    interval, add = newton[1] + newton[2] * (1.0 - nodes[0] - nodes[1]), 2.0 * newton[2]
+    add_q16 = floor(add * ONE_Q16 + 0.5)
+    # What rounding A bends is taken back by I, so that both ends of the run stay.
+    bent = add - add_q16 / ONE_Q16
+    return inside, floor((interval + 0.5 * bent * (steps - 2)) * ONE_Q16 + 0.5), add_q16

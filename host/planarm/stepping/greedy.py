@@ -111,7 +111,7 @@ def try_segment(windows: Windows, following: Ticks, last: Ticks, begin: int, dur
         n = following[j]
         if trial[j, COUNT] > 0 and n + trial[j, COUNT] > windows.steps[n, RUN_END]:
             return -1
-    end = border(windows, following, begin, duration_ticks, trial)
+    end = border(windows, following, last, begin, duration_ticks, trial)
     if end <= begin:
         return -1
     for j in range(trial.shape[0]):
@@ -124,7 +124,7 @@ def try_segment(windows: Windows, following: Ticks, last: Ticks, begin: int, dur
         for i in range(steps):
             low[i] = max(windows.steps[n + i, LOW], begin) - begin
             high[i] = min(windows.steps[n + i, HIGH], end - 1) - begin
-        low[0] = max(low[0], last[j] + windows.steps[n, GAP] - begin, windows.steps[n, SETUP])
+        low[0] = earliest_tick(windows, n, last[j], begin) - begin
         found, first, interval, add = fit_run(low, high, windows.least_interval[j])
         if not found:
             return -1
@@ -133,7 +133,13 @@ def try_segment(windows: Windows, following: Ticks, last: Ticks, begin: int, dur
 
 
 @kernel
-def border(windows: Windows, following: Ticks, begin: int, duration_ticks: int, trial: Ticks) -> int:
+def earliest_tick(windows: Windows, n: int, last: int, begin: int) -> int:
+    """Return the earliest tick of step n, the first of its joint in a segment from `begin`, after one at `last`."""
+    return int(max(windows.steps[n, LOW], last + windows.steps[n, GAP], begin + windows.steps[n, SETUP]))
+
+
+@kernel
+def border(windows: Windows, following: Ticks, last: Ticks, begin: int, duration_ticks: int, trial: Ticks) -> int:
     """Return where a segment with trial[j, COUNT] steps of each joint j ends, or -1 when no border is possible.
 
     After the earliest tick of its last steps and before the latest of those that follow; best in the middle between the
@@ -144,7 +150,9 @@ def border(windows: Windows, following: Ticks, begin: int, duration_ticks: int, 
     for j in range(trial.shape[0]):
         n = following[j] + trial[j, COUNT]
         if trial[j, COUNT] > 0:
-            earliest = max(earliest, windows.steps[n - 1, LOW] + 1)
+            run = (trial[j, COUNT] - 1) * windows.least_interval[j]
+            reached = earliest_tick(windows, following[j], last[j], begin) + run
+            earliest = max(earliest, reached + 1, windows.steps[n - 1, LOW] + 1)
             before = max(before, windows.steps[n - 1, HIGH] + 1)
         if n < windows.first[j + 1]:
             latest = min(latest, windows.steps[n, HIGH] - windows.steps[n, SETUP])

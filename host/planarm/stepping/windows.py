@@ -1,8 +1,8 @@
 """How far compression may move each step: windows that always leave a way through.
 
 A step may be early or late by its tolerance. But a late step pushes the next one, so the windows are tightened: the
-latest tick of a step leaves room for the least gap to the next one, and the earliest for that to the one before. Exact
-ticks keep all gaps, so they stay inside, and from any choice up to some step the rest can be chosen.
+latest tick of a step leaves room for the least gap to the latest tick of the next. Exact ticks keep all gaps, so they
+stay inside, and from any choice up to some step the rest can be chosen.
 """
 
 from typing import NamedTuple
@@ -73,8 +73,6 @@ def _tighten(ticks: Ticks, directions: Directions, least_interval: int, steps: T
         turns = n == 0 or directions[n] != directions[n - 1]
         steps[n, GAP] = MIN_REVERSAL_TICKS if turns else least_interval
         steps[n, SETUP] = MIN_DIR_SETUP_TICKS if turns else 0
-        if n > 0:
-            steps[n, LOW] = max(steps[n, LOW], steps[n - 1, LOW] + steps[n, GAP])
     for n in range(count - 1, -1, -1):
         if n + 1 < count:
             steps[n, HIGH] = min(steps[n, HIGH], steps[n + 1, HIGH] - steps[n + 1, GAP])

@@ -1,0 +1,48 @@
+"""The certificate's checks of the motion: limits from positions alone, and steps that are late or early."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from motion_paths import joint, joint_line
+from planarm.stepping.check_motion import check_deviation, check_limits
+from planarm.stepping.quantise import quantise
+from planarm.stepping.train import JointSteps
+from planarm.trajectory.timing import time_path
+
+JOINTS = (joint(), joint(1.5, 8.0))
+
+
+@pytest.fixture(scope="module")
+def motion():
+    return time_path(joint_line((0.0, 0.3), (1.0, -0.9)), JOINTS)
+
+
+def test_planned_speeds_and_accelerations_are_those_of_the_motion(motion):
+    # Joint 2 goes 1.2 rad, joint 1 the same motion scaled by 1 / 1.2; joint 2 has the lower limits: 1.5 and 0.8 x 8.
+    values = {check.name: check.value for check in check_limits(motion, JOINTS)}
+    assert values["joint 2 planned speed"] == pytest.approx(1.5, rel=1e-3)
+    assert values["joint 2 planned acceleration"] == pytest.approx(6.4, rel=1e-3)
+    assert values["joint 1 planned speed"] == pytest.approx(1.25, rel=1e-3)
+    assert values["joint 1 planned acceleration"] == pytest.approx(6.4 / 1.2, rel=1e-3)
+
+
+@pytest.mark.parametrize(("shift_ticks", "verdict"), [(0, "green"), (1000, "red"), (-1000, "red")])
+def test_steps_that_are_late_or_early_are_found(motion, shift_ticks, verdict):
+    # At 1.25 rad/s a step of joint 1 takes 5027 ticks; 1000 of them are 0.2 micro-steps.
+    train = quantise(motion, JOINTS)
+    first, second = train.steps
+    middle = (first.ticks > 0.4 * train.duration_ticks) & (first.ticks < 0.6 * train.duration_ticks)
+    made = replace(train, steps=(JointSteps(first.ticks + middle * shift_ticks, first.directions), second))
+    one, two = check_deviation(motion, made, JOINTS)
+    assert one.verdict == verdict
+    assert one.value == pytest.approx(0.5 + abs(shift_ticks) / 5027, abs=0.01)
+    assert two.verdict == "green"
+
+
+def test_a_motion_without_steps_must_not_go_far(motion):
+    train = quantise(motion, JOINTS)
+    still = JointSteps(np.zeros(0, np.int64), np.zeros(0, np.int8))
+    checks = check_deviation(motion, replace(train, steps=(still, still)), JOINTS)
+    assert [check.verdict for check in checks] == ["red", "red"]
