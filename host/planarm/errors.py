@@ -5,6 +5,8 @@
     PlanarmError
     ├── SceneError        2  the scene file, or a value given in its place, is wrong
     ├── EmulatorError     2  the emulator cannot start: image, link or file
+    ├── OutputError       2  a file or folder cannot be written
+    ├── PlanFileError     2  the file is no plan, or cannot be read
     ├── NoPathError       3  start and goal are fine, but no collision-free path joins them
     ├── TimingError       4  the path cannot be timed within the joints' limits
     ├── CertificateError  4  a check of the finished plan failed
@@ -42,6 +44,18 @@ class SceneError(PlanarmError):
 
 class EmulatorError(PlanarmError):
     """The emulator cannot start: a bad flash image, a link or a file that cannot be made."""
+
+    exit_code: ClassVar[int] = 2
+
+
+class OutputError(PlanarmError):
+    """A file or folder that was asked for cannot be written."""
+
+    exit_code: ClassVar[int] = 2
+
+
+class PlanFileError(PlanarmError):
+    """What was given as a plan is none, or cannot be read."""
 
     exit_code: ClassVar[int] = 2
 

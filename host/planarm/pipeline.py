@@ -13,12 +13,12 @@ from pathlib import Path
 from typing import Any
 
 from planarm.analysis.step_count import MeasuredSteps, StepComparison, Waveform, compare_steps, measure_steps
-from planarm.errors import CertificateError, NoPathError, SceneError, StepsDifferError
+from planarm.errors import CertificateError, NoPathError, SceneError, StepsDifferError, TimingError
 from planarm.link.exchange import StreamResult, stream_plan
 from planarm.link.transport import PinTrace, Transport, open_transport
 from planarm.model.arm import Arm
 from planarm.plan_file import StoredPlan
-from planarm.run_folder import write_run_folder
+from planarm.run_folder import begin_run_folder, finish_run_folder
 from planarm.scene import Scene
 from planarm.search.grid_search import find_path
 from planarm.search.path import Path as TipPath
@@ -35,6 +35,9 @@ from planarm_wire.messages import DIR_PINS, STEP_PINS
 
 Notice = Callable[[str, float], None]
 """Told the stage and the share of it that is done."""
+
+LONGEST_MOTION_S = 600.0
+"""The certificate looks at a motion every 0.1 ms; beyond ten minutes that takes gigabytes."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,7 +72,7 @@ def plan_scene(scene: Scene, notice: Notice) -> Plan:
     Raises:
         SceneError: Start or goal cannot be taken.
         NoPathError: Nothing joins them; the message says why.
-        TimingError: A joint would have to step faster than the firmware can.
+        TimingError: A joint would have to step faster than the firmware can, or the motion would take too long.
     """
     began_s = time.perf_counter()
     notice("plan", 0.0)
@@ -77,6 +80,11 @@ def plan_scene(scene: Scene, notice: Notice) -> Plan:
     notice("plan", 0.4)
     smooth_path = blend_corners(path, free_map)
     trajectory = time_path(smooth_path, scene.joints)
+    if trajectory.duration_s > LONGEST_MOTION_S:
+        raise TimingError(
+            f"{scene.source}: the motion would take {trajectory.duration_s:.6g} s, {LONGEST_MOTION_S:g} s are the "
+            "most; raise joints.max_speed_deg_s or joints.max_acceleration_deg_s2, or move task.goal_cm nearer"
+        )
     notice("plan", 0.6)
     train = quantise(trajectory, scene.joints)
     segments = compress(train)
@@ -149,11 +157,12 @@ def run_scene(scene: Scene, port: str, out: Path, notice: Notice) -> dict[str, A
         PlanarmError: the branch of the tree tells which stage failed. Differing steps are reported first, then raised.
     """
     plan = plan_scene(scene, notice)
+    begin_run_folder(out, stored(plan))
     with closing(open_transport(port, scene.link.baud)) as transport:
         streamed = stream(plan.segments, plan.certificate, transport, notice)
         findings = judge_pins(plan.segments, transport.pins) if transport.pins else None
     summary = summarise(plan, streamed, findings)
-    write_run_folder(out, plan, stored(plan), summary, transport.pins)
+    finish_run_folder(out, plan, summary, transport.pins)
     if findings and not findings.comparison.agrees:
         raise StepsDifferError(f"{scene.source}: {findings.comparison.explain()}; see {out}")
     return summary

@@ -13,7 +13,8 @@ from pathlib import Path
 from typing import Any
 
 import planarm
-from planarm.errors import CertificateError
+from planarm.errors import CertificateError, PlanFileError
+from planarm.output import writing
 from planarm.stepping.certify import Certificate, Check
 from planarm.stepping.segments import SegmentPlan
 from planarm_wire.messages import SPEC_HASH, Move, Segment
@@ -41,26 +42,36 @@ class StoredPlan:
 
 
 def save_plan(plan: StoredPlan, path: Path) -> None:
-    """Write the plan to `path`."""
+    """Write the plan to `path`.
+
+    Raises:
+        OutputError: It cannot be written.
+    """
     body = _to_json(plan)
     body["sha256"] = _digest(body)
-    path.write_text(json.dumps(body, indent=1) + "\n", encoding="utf-8")
+    with writing(path):
+        path.write_text(json.dumps(body, indent=1) + "\n", encoding="utf-8")
 
 
 def load_plan(path: Path) -> StoredPlan:
     """Read a plan.
 
     Raises:
-        CertificateError: The file is missing, damaged, of another format, or made for another wire.
+        PlanFileError: The file cannot be read, or is no plan of this format.
+        CertificateError: It was changed after it was certified, or made for another wire.
     """
     try:
         body = json.loads(path.read_text(encoding="utf-8"))
     except OSError as error:
-        raise CertificateError(f"{path}: cannot be read: {error.strerror}") from error
-    except ValueError as error:
-        raise CertificateError(f"{path}: is no plan: {error}; make one with 'planarm plan'") from error
+        raise PlanFileError(f"{path}: cannot be read: {error.strerror}; make a plan with 'planarm plan'") from error
+    except UnicodeDecodeError as error:
+        raise PlanFileError(
+            f"{path}: is no plan: byte {error.start} is no UTF-8; make one with 'planarm plan'"
+        ) from error
+    except (ValueError, RecursionError) as error:
+        raise PlanFileError(f"{path}: is no plan: {error}; make one with 'planarm plan'") from error
     if not isinstance(body, dict) or body.get("format") != FORMAT:
-        raise CertificateError(f"{path}: is no plan of format {FORMAT}; make it anew with 'planarm plan'")
+        raise PlanFileError(f"{path}: is no plan of format {FORMAT}; make it anew with 'planarm plan'")
     if body.pop("sha256", None) != _digest(body):
         raise CertificateError(f"{path}: was changed after it was made (its SHA-256 differs); make it anew")
     if body["spec_hash"] != SPEC_HASH:

@@ -12,6 +12,7 @@ import numpy as np
 from planarm.model.arm import Arm
 from planarm.model.kinematics import forward
 from planarm.model.shapes import shape_of
+from planarm.output import writing
 from planarm.plan_file import StoredPlan, save_plan
 from planarm.report import draw_joint_angles, draw_step_rates, draw_workspace
 from planarm_wire.messages import MIN_INTERVAL_TICKS, TICKS_HZ
@@ -24,31 +25,37 @@ POSES_SHOWN = 7
 CURVE_POINTS = 600
 
 
-def write_run_folder(
-    out: Path, plan: Plan, stored: StoredPlan, summary: Mapping[str, Any], trace: PinTrace | None
-) -> list[Path]:
-    """Write everything a person or a program wants to keep of a run, and return the files.
+def begin_run_folder(out: Path, stored: StoredPlan) -> None:
+    """Make the folder, `out`, and put the plan in it, before anything moves; what an earlier run left is overwritten.
+
+    Raises:
+        OutputError: it cannot be made or written.
+    """
+    with writing(out):
+        out.mkdir(parents=True, exist_ok=True)
+    save_plan(stored, out / "run.plan")
+
+
+def finish_run_folder(out: Path, plan: Plan, summary: Mapping[str, Any], trace: PinTrace | None) -> None:
+    """Put everything else that a person or a program wants to keep of a run into the folder.
 
     Args:
-        out: the folder, made when missing; files of an earlier run in it are overwritten.
+        out: the folder, which `begin_run_folder` made.
         plan: the plan with its stages.
-        stored: the same in the form of a plan file.
         summary: the run's figures.
         trace: the emulated board's pins; None leaves out trace.vcd.
+
+    Raises:
+        OutputError: a file cannot be written.
     """
-    out.mkdir(parents=True, exist_ok=True)
-    files = [out / name for name in ("run.plan", "summary.json", "workspace.png", "joint_angles.png", "step_rates.png")]
-    save_plan(stored, files[0])
-    files[1].write_text(json.dumps(summary, indent=1) + "\n", encoding="utf-8")
-    _draw(plan, *files[2:])
-    if trace is not None:
-        trace.write_vcd(out / "trace.vcd")
-        files.append(out / "trace.vcd")
-    return files
+    with writing(out):
+        (out / "summary.json").write_text(json.dumps(summary, indent=1) + "\n", encoding="utf-8")
+        _draw(plan, *(out / name for name in ("workspace.png", "joint_angles.png", "step_rates.png")))
+        if trace is not None:
+            trace.write_vcd(out / "trace.vcd")
 
 
 def _draw(plan: Plan, workspace: Path, joint_angles: Path, step_rates: Path) -> None:
-
     scene, trajectory = plan.scene, plan.trajectory
     arm = Arm.from_spec(scene.arm)
     t_s = np.linspace(0.0, trajectory.duration_s, CURVE_POINTS)

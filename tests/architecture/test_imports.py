@@ -16,6 +16,7 @@ ALLOWED: dict[str, set[str]] = {
     "planarm_wire.kernel_cache": set(),
     "planarm": set(),
     "planarm.errors": set(),
+    "planarm.output": {"planarm.errors"},
     "planarm.scene": {"planarm.errors"},
     "planarm.model": {"planarm.errors", "planarm.scene", "planarm_wire.kernel_cache"},
     "planarm.workspace": {"planarm.errors", "planarm.scene", "planarm.model", "planarm_wire.kernel_cache"},
@@ -73,6 +74,7 @@ ALLOWED: dict[str, set[str]] = {
     "planarm.run_folder": {
         "planarm.model",
         "planarm.report",
+        "planarm.output",
         "planarm.plan_file",
         "planarm.pipeline",
         "planarm.link",
@@ -83,6 +85,7 @@ ALLOWED: dict[str, set[str]] = {
     "planarm.plan_file": {
         "planarm",
         "planarm.errors",
+        "planarm.output",
         "planarm.scene",
         "planarm.stepping",
         "planarm_wire",
@@ -103,6 +106,7 @@ ALLOWED: dict[str, set[str]] = {
         "planarm.report",
         "planarm.experiments",
         "planarm.pipeline",
+        "planarm.output",
         "planarm.plan_file",
         "planarm.warm_up",
         "planarm_sim",

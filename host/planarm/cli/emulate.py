@@ -34,6 +34,4 @@ def execute(options: argparse.Namespace) -> int:
     for warning in result.warnings:
         print(f"note: {warning}", file=sys.stderr)
     print(json.dumps(asdict(result)) if options.json else summary(result))
-    if result.program_failed:
-        raise DeviceFault(result.ended)
-    return 0
+    return DeviceFault.exit_code if result.program_failed else 0

@@ -5,37 +5,82 @@ from __future__ import annotations
 import argparse
 import importlib
 import json
+import os
 import sys
 from collections.abc import Sequence
+from typing import NoReturn, TypeAlias
 
 import planarm
-from planarm.errors import PlanarmError
+from planarm.errors import OutputError, PlanarmError
 
 EXIT_CODES = """exit codes:
   0 ok    2 bad input    3 no path    4 cannot be timed or certified
   5 link    6 device fault    7 executed steps differ from the plan"""
+
+STOPPED_READING = 141
+"""What a shell reports of a program that a closed pipe has ended."""
 
 PLANNERS = ("a_star", "modified_a_star", "chaos_a_star", "chs")
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run one command and leave with its exit code."""
-    options = build_parser().parse_args(arguments)
-    command = importlib.import_module(f"planarm.cli.{options.command}")
+    words = sys.argv[1:] if arguments is None else list(arguments)
     try:
-        code = command.execute(options)
-    except PlanarmError as error:
-        report_error(error, as_json=options.json)
-        code = error.exit_code
-    except KeyboardInterrupt:
-        print("stopped by the keyboard", file=sys.stderr)
-        code = 130
+        code = _run(words)
+        if sys.stdout is not None:  # closed by whoever started us
+            sys.stdout.flush()
+    except BrokenPipeError:  # the reader, such as head, has seen enough; a file's errors carry its name
+        code = _leave_quietly(STOPPED_READING)
+    except OSError as error:
+        print(f"planarm: stdout: {error.strerror or error}", file=sys.stderr)
+        code = _leave_quietly(OutputError.exit_code)
     sys.exit(code)
+
+
+def _run(words: Sequence[str]) -> int:
+    """Run the command that the words ask for; return its exit code."""
+    as_json = "--json" in words
+    try:
+        options = build_parser().parse_args(words)
+        command = importlib.import_module(f"planarm.cli.{options.command}")
+        return int(command.execute(options))
+    except PlanarmError as error:
+        report_error(error, as_json)
+        return error.exit_code
+    except KeyboardInterrupt:
+        report_error(_Stopped("stopped by the keyboard"), as_json)
+        return _Stopped.exit_code
+
+
+def _leave_quietly(code: int) -> int:
+    """Give stdout up, so that the interpreter does not try to write to it again at its end."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    return code
+
+
+class _Stopped(PlanarmError):  # noqa: N818 - not an error
+    """Ctrl-C."""
+
+    exit_code = 130
+
+
+class _UsageError(PlanarmError):
+    """The words of the command line are wrong."""
+
+    exit_code = 2
+
+
+class _Parser(argparse.ArgumentParser):
+    """A parser whose errors are told like all others."""
+
+    def error(self, message: str) -> NoReturn:
+        raise _UsageError(f"{message}; '{self.prog} --help' tells what there is")
 
 
 def build_parser() -> argparse.ArgumentParser:
     """Return the whole command line's parser."""
-    parser = argparse.ArgumentParser(
+    parser = _Parser(
         prog="planarm",
         description="From a scene file to proven step pulses on an Arduino Uno.",
         epilog=EXIT_CODES,
@@ -60,17 +105,17 @@ def report_error(error: PlanarmError, as_json: bool) -> None:
         print(f"planarm: {error}", file=sys.stderr)
 
 
-Commands = argparse._SubParsersAction
+Commands: TypeAlias = "argparse._SubParsersAction[_Parser]"
 
 
-def _add_plan(commands: Commands[argparse.ArgumentParser]) -> None:
+def _add_plan(commands: Commands) -> None:
     command = commands.add_parser("plan", help="plan a scene and write the certified plan", epilog=EXIT_CODES)
     _add_scene(command)
     command.add_argument("-o", "--output", metavar="FILE.plan", required=True, help="where to write the plan")
     _add_json(command)
 
 
-def _add_run(commands: Commands[argparse.ArgumentParser]) -> None:
+def _add_run(commands: Commands) -> None:
     command = commands.add_parser("run", help="plan, stream, verify and report", epilog=EXIT_CODES)
     _add_scene(command)
     _add_port(command)
@@ -78,14 +123,14 @@ def _add_run(commands: Commands[argparse.ArgumentParser]) -> None:
     _add_json(command)
 
 
-def _add_stream(commands: Commands[argparse.ArgumentParser]) -> None:
+def _add_stream(commands: Commands) -> None:
     command = commands.add_parser("stream", help="stream a certified plan", epilog=EXIT_CODES)
     command.add_argument("plan", metavar="FILE.plan")
     _add_port(command)
     _add_json(command)
 
 
-def _add_emulate(commands: Commands[argparse.ArgumentParser]) -> None:
+def _add_emulate(commands: Commands) -> None:
     command = commands.add_parser("emulate", help="run a flash image on the emulated Uno behind a virtual serial port")
     command.add_argument("--firmware", metavar="HEX|ELF", help="the image to run (default: the released firmware)")
     command.add_argument("--link", metavar="PATH", help="make PATH a link to the pty")
@@ -94,7 +139,7 @@ def _add_emulate(commands: Commands[argparse.ArgumentParser]) -> None:
     _add_json(command)
 
 
-def _add_compare(commands: Commands[argparse.ArgumentParser]) -> None:
+def _add_compare(commands: Commands) -> None:
     command = commands.add_parser("compare", help="compute a paper's table anew beside the published one")
     command.add_argument("table", choices=("table2",), help="table2: A*, Modified A*, Chaos A* and CHS, two cases")
     command.add_argument("--out", metavar="DIR", help="folder for table2.json, table2.md and pictures")

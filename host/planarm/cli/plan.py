@@ -15,16 +15,18 @@ def execute(options: argparse.Namespace) -> int:
     scene = chosen_scene(options)
     tell_first_compile("planarm")
     from planarm.errors import CertificateError
+    from planarm.output import require_place
     from planarm.pipeline import plan_scene, stored
     from planarm.plan_file import save_plan
     from planarm.warm_up import warm_up
 
+    target = Path(options.output)
+    require_place(target)
     with progress(options.json) as notice:
         notice("kernels", 0.0)
         warm_up()
         notice("kernels", 1.0)
         plan = plan_scene(scene, notice)
-    target = Path(options.output)
     save_plan(stored(plan), target)
     if not plan.certificate.ok:
         raise CertificateError(f"{target}: {plan.certificate.explain()}")

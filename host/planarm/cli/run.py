@@ -22,7 +22,7 @@ def execute(options: argparse.Namespace) -> int:
         notice("kernels", 0.0)
         warm_up()
         notice("kernels", 1.0)
-        summary = run_scene(scene, options.port or scene.link.port, out, notice)
+        summary = run_scene(scene, scene.link.port if options.port is None else options.port, out, notice)
     if options.json:
         print(json.dumps(summary))
     else:

@@ -21,7 +21,7 @@ def execute(options: argparse.Namespace) -> int:
 
     plan = load_plan(Path(options.plan))
     link = plan.scene["link"]
-    port = options.port or link["port"]
+    port = link["port"] if options.port is None else options.port
     with progress(options.json) as notice, closing(open_transport(port, link["baud"])) as transport:
         result = stream(plan.segments, plan.certificate, transport, notice)
     moved = moved_usteps(result.ledger_before, result.ledger_after)

@@ -61,9 +61,14 @@ def stream_plan(
 
     Raises LinkError (StreamError once the motion has begun) when the line fails, DeviceFault (StreamFault) when the
     device latches a fault or refuses, StepsDifferError when the ledger does not show the plan's steps, and
-    CertificateError when `segments` are no whole motion. Stream errors carry a `position`.
+    CertificateError when `segments` are no whole motion. Stream errors carry a `position`. Without segments the arm is
+    where it should be: the device is asked for its ledger, and nothing is enabled.
     """
     began_s = transport.clock.now_s()
+    if not segments:
+        session = open_session(transport, limits)
+        request(transport, session, Query())
+        return _result(session, transport.clock.now_s(), began_s)
     session = _new_session(transport, limits)
     stream = Stream(session, segments, options, on_progress)
     try:
@@ -76,7 +81,7 @@ def stream_plan(
             raise StreamError(str(error), position) from error
         cause = fault_words(fault) if fault is not Fault.NONE else str(error)  # a refusal may foretell a fault
         raise StreamFault(cause, position) from error
-    return _result(session, stream, transport.clock.now_s(), began_s)
+    return _result(session, transport.clock.now_s(), began_s, stream)
 
 
 def open_session(transport: Transport, limits: SessionLimits | None = None) -> Session:
@@ -160,16 +165,18 @@ def _report(certainty: Certainty, last: Status, stream: Stream) -> PositionRepor
     )
 
 
-def _result(session: Session, stream: Stream, now_s: float, began_s: float) -> StreamResult:
-    assert session.welcome is not None and session.status is not None and stream.ledger_before is not None
+def _result(session: Session, now_s: float, began_s: float, stream: Stream | None = None) -> StreamResult:
+    assert session.welcome is not None and session.status is not None
+    before = stream.ledger_before if stream else session.status.ledger
+    assert before is not None, "a motion begins with a ledger"
     return StreamResult(
         boot_nonce=session.welcome.boot_nonce,
         firmware_version=session.welcome.firmware_version,
-        ledger_before=stream.ledger_before,
+        ledger_before=before,
         ledger_after=session.status.ledger,
-        segments=stream.total_segments,
+        segments=stream.total_segments if stream else 0,
         duration_s=now_s - began_s,
-        motion_s=now_s - stream.started_s,
+        motion_s=now_s - stream.started_s if stream else 0.0,
         frames_sent=session.arq_counters.frames_sent,
         retransmissions=session.arq_counters.retransmissions,
         bytes_sent=session.bytes_sent,
@@ -177,6 +184,6 @@ def _result(session: Session, stream: Stream, now_s: float, began_s: float) -> S
         crc_errors=session.line.crc_errors,
         bytes_lost=session.line.overruns + session.line.ring_full,
         damaged_replies=session.line.damaged_replies,
-        least_queued=stream.least_queued,
-        cleared_fault=stream.cleared_fault,
+        least_queued=stream.least_queued if stream else 0,
+        cleared_fault=stream.cleared_fault if stream else Fault.NONE,
     )

@@ -1,0 +1,31 @@
+"""Writing files and folders that a user named: whatever goes wrong is one sentence with the path and the cause."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from planarm.errors import OutputError
+
+
+@contextmanager
+def writing(path: Path) -> Iterator[None]:
+    """Turn an OSError from writing `path` into an OutputError that says what to change."""
+    try:
+        yield
+    except OSError as error:
+        cause = error.strerror or str(error)
+        raise OutputError(f"{path}: cannot be written: {cause}; give another place, or make room for it") from error
+
+
+def require_place(path: Path) -> None:
+    """Refuse a file's path that cannot be written whatever its content, before any work is done for it.
+
+    Raises:
+        OutputError: `path` is a folder, or its folder does not exist.
+    """
+    if path.is_dir():
+        raise OutputError(f"{path}: cannot be written: is a folder; give the path of a file")
+    if not path.parent.is_dir():
+        raise OutputError(f"{path}: cannot be written: {path.parent} is no folder; make it first")
