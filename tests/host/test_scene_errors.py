@@ -311,3 +311,10 @@ def toml_value(value):
     if isinstance(value, str):
         return '"' + "".join(f"\\U{ord(c):08X}" for c in value) + '"'
     return "none" if value is None else repr(value)
+
+
+@pytest.mark.parametrize("value", ["9" * 5000, "[" * 5000 + "]" * 5000], ids=["a long number", "many brackets"])
+def test_toml_beyond_what_python_reads_is_a_scene_error(value):
+    """tomllib lets ValueError and RecursionError through."""
+    with pytest.raises(SceneError, match="is not valid TOML"):
+        parse_scene(f"name = {value}", "arm.toml")

@@ -82,7 +82,7 @@ def parse_scene(text: str, source: str) -> Scene:
     """
     try:
         data = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as problem:
+    except (ValueError, RecursionError) as problem:  # TOMLDecodeError; numbers of 4301 digits; a thousand brackets
         raise SceneError(source, "", f"is not valid TOML: {problem}") from problem
     root = Table.with_keys(source, "", data, ROOT_KEYS)
     workspace = _workspace(root.table("workspace", WORKSPACE_KEYS))
