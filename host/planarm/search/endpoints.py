@@ -20,7 +20,7 @@ _FORBIDDEN = {
     BEYOND_REACH: "is beyond the arm's reach",
     INNER_HOLE: "is nearer to the base than the links and the limits of joint 2 allow",
     OBSTACLE: "brings a link's centre line to within {margin:g} cm of an obstacle (half of arm.link_width_cm, "
-    "workspace.clearance_cm, allowances)",
+    "workspace.clearance_cm, half a micro-step)",
     LIMIT: "needs a joint beyond arm.joint_limits_deg or a link below the floor",
 }
 

@@ -6,7 +6,7 @@ that are never reached, or that a better one replaced meanwhile, are never sorte
 consistent heuristic no entry lies further than two of the longest moves above the one being expanded.
 
 The kernel gets the arrays one by one and is one flat function, and entries are pushed where they are made: Numba
-counts references to every array at every call, and with small helpers that took most of the search's time.
+counts references to every array at every call, and with small functions that took most of the search's time.
 """
 
 from typing import NamedTuple

@@ -46,7 +46,9 @@ def pose_problem(scene: Scene, world: ArmWorld, tip_cm: Point) -> str:
     theta1 = theta1_at(arm, x, y, acos(cos_beta_at(arm, r)))
     distance, nearest = obstacle_clearance(world, ex, ey, x, y)
     height = floor_clearance(arm, ey, y)
-    keep = f"{arm.margin_cm:.4g} cm are to be kept (half of arm.link_width_cm, workspace.clearance_cm, allowances)"
+    keep = (
+        f"{arm.margin_cm:.4g} cm are to be kept (half of arm.link_width_cm, workspace.clearance_cm, half a micro-step)"
+    )
     if not arm.theta1_min_rad <= theta1 <= arm.theta1_max_rad:
         limits = f"[{degrees(arm.theta1_min_rad):.6g}, {degrees(arm.theta1_max_rad):.6g}]"
         return (

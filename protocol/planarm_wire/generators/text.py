@@ -1,4 +1,4 @@
-"""Small helpers that the generated files share."""
+"""Small functions that the generated files share."""
 
 from __future__ import annotations
 
