@@ -238,3 +238,12 @@ def test_bad_words_are_exit_code_2(capsys, words):
         main(["compare", *(["table2"] if words[0] == "--seeds" else []), *words])
     assert left.value.code == 2
     assert capsys.readouterr().out == ""
+
+
+def test_a_folder_that_cannot_be_made_is_bad_input(capsys, tmp_path):
+    (tmp_path / "file").write_text("")
+    with pytest.raises(SystemExit) as left:
+        main(["compare", "table2", "--out", str(tmp_path / "file" / "folder"), "--json"])
+    error = json.loads(capsys.readouterr().out)["error"]
+    assert left.value.code == error["exit_code"] == 2
+    assert str(tmp_path / "file" / "folder") in error["message"]

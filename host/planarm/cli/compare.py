@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 from planarm.cli.progress import progress
 from planarm.cli.scenes import tell_first_compile
+from planarm.output import writing
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -25,18 +26,23 @@ def execute(options: argparse.Namespace) -> int:
     from planarm.experiments.table2_folder import write_table2
     from planarm.experiments.table2_tables import as_json
 
+    out = Path(options.out) if options.out else None
+    if out:
+        with writing(out):  # before the work is done
+            out.mkdir(parents=True, exist_ok=True)
     with progress(options.json) as notice:
         result = compare_table2(options.seeds, notice)
-        if options.out:
-            write_table2(result, Path(options.out), notice)
+        if out:
+            with writing(out):
+                write_table2(result, out, notice)
     if options.json:
         print(json.dumps(as_json(result)))
     else:
-        _print(result, options.out)
+        _print(result, out)
     return 0
 
 
-def _print(result: Table2, out: str | None) -> None:
+def _print(result: Table2, out: Path | None) -> None:
     from rich.console import Console
 
     from planarm.experiments.table2_tables import assumptions, findings, tables
@@ -47,7 +53,7 @@ def _print(result: Table2, out: str | None) -> None:
         console.print(_shown(one))
     _print_sentences(console, "What is reproduced, and what is not", findings(result))
     if out:
-        console.print(f"table2.json, table2.md and pictures: {out}")
+        console.print(f"table2.json, table2.md and pictures: {out}", markup=False)
 
 
 def _shown(one: TextTable) -> Table:
