@@ -10,6 +10,7 @@ import pytest
 
 from planarm.cli import main as command_line
 from planarm.cli import plan as plan_command
+from planarm.cli import run as run_command
 from planarm.cli.main import main
 
 CASE_1 = Path(__file__).resolve().parents[2] / "examples" / "table1_case1.toml"
@@ -74,13 +75,21 @@ def test_the_keyboard_with_json_is_one_object(capsys, monkeypatch):
 
     monkeypatch.setattr(plan_command, "execute", interrupted)
     code, out, _ = leave(capsys, "plan", CASE_1, "-o", "x.plan", "--json")
-    assert code == json.loads(out)["error"]["exit_code"] == 130, "what shells report of SIGINT"
+    error = json.loads(out)["error"]
+    assert code == error["exit_code"] == 130, "what shells report of SIGINT"
+    assert error["kind"] == "Stopped"
 
 
 def test_an_empty_port_is_not_the_scenes(capsys, tmp_path):
     """A script's unset variable must not start the emulator in place of the arm."""
     code, out, _ = leave(capsys, "run", CASE_1, "--port", "", "--out", tmp_path)
     assert (code, out) == (5, "")
+
+
+def test_brackets_in_a_folders_name_are_no_markup(capsys):
+    """rich reads [/x] as the end of a style, and fails when none began."""
+    run_command._print({"scene": "x"}, Path("out [/x]"))
+    assert "out [/x]" in capsys.readouterr().out
 
 
 def test_a_reader_that_leaves_early_is_no_traceback():

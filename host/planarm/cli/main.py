@@ -49,8 +49,8 @@ def _run(words: Sequence[str]) -> int:
         report_error(error, as_json)
         return error.exit_code
     except KeyboardInterrupt:
-        report_error(_Stopped("stopped by the keyboard"), as_json)
-        return _Stopped.exit_code
+        report_error(Stopped("stopped by the keyboard"), as_json)
+        return Stopped.exit_code
 
 
 def _leave_quietly(code: int) -> int:
@@ -59,13 +59,13 @@ def _leave_quietly(code: int) -> int:
     return code
 
 
-class _Stopped(PlanarmError):  # noqa: N818 - not an error
+class Stopped(PlanarmError):  # noqa: N818 - not an error
     """Ctrl-C."""
 
     exit_code = 130
 
 
-class _UsageError(PlanarmError):
+class UsageError(PlanarmError):
     """The words of the command line are wrong."""
 
     exit_code = 2
@@ -75,7 +75,7 @@ class _Parser(argparse.ArgumentParser):
     """A parser whose errors are told like all others."""
 
     def error(self, message: str) -> NoReturn:
-        raise _UsageError(f"{message}; '{self.prog} --help' tells what there is")
+        raise UsageError(f"{message}; '{self.prog} --help' tells what there is")
 
 
 def build_parser() -> argparse.ArgumentParser:

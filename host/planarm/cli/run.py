@@ -37,4 +37,4 @@ def _print(summary: dict[str, object], out: Path) -> None:
 
     console = Console()
     console.print(summary_table(summary))
-    console.print(f"plan, trace, summary and pictures: {out}")
+    console.print(f"plan, trace, summary and pictures: {out}", markup=False)  # brackets in names are names
