@@ -151,6 +151,15 @@ def test_a_leftover_link_is_replaced_and_anything_else_is_kept(tmp_path):
     assert link.read_text() == "precious"
 
 
+def test_a_leftover_link_to_a_terminal_of_the_same_number_is_replaced(tmp_path):
+    """The system gives a killed emulator's pty number to the next one, and its link no longer dangles."""
+    link = tmp_path / "uno"
+    with PtyLine() as line:
+        link.symlink_to(line.path)
+        line._make_link(link)
+        assert str(link.readlink()) == line.path
+
+
 def test_a_link_that_became_someone_elses_is_not_removed(tmp_path):
     link = tmp_path / "uno"
     with PtyLine(link):

@@ -25,7 +25,8 @@ class PtyLine:
     """The master side of a pty in raw mode, with an optional link at a fixed path. A context manager.
 
     Args:
-        link: path of a symbolic link to make; a dangling link there, left by a killed emulator, is replaced.
+        link: path of a symbolic link to make; a link there that a killed emulator left is replaced: it
+            dangles, or names this very terminal, whose number was free again.
 
     Raises:
         BridgeError: no pty to be had, or `link` exists and is not such a leftover, or cannot be made.
@@ -53,7 +54,7 @@ class PtyLine:
 
     def _make_link(self, link: Path) -> None:
         try:
-            if link.is_symlink() and not link.exists():
+            if link.is_symlink() and (not link.exists() or str(link.readlink()) == self.path):
                 link.unlink()
             link.symlink_to(self.path)
         except OSError as error:
