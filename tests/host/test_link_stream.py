@@ -178,7 +178,7 @@ def test_a_plan_that_underruns_on_a_bad_line_executed_a_whole_beginning_of_it(to
     except (LinkError, DeviceFault):
         assert line.device.state is State.FAULT or not line.device.segments_executed
     executed = tuple(line.device.segments_executed)
-    assert executed == plan[: len(executed)]
+    assert list(executed) == list(plan[: len(executed)])
 
 
 def test_damage_is_counted():
@@ -235,7 +235,7 @@ def test_a_restart_in_a_motion_loses_the_position(moment_s, deaf_s):
     assert caught.value.exit_code == 5
     assert line.device.state is State.IDLE
     executed = tuple(line.device.segments_executed)
-    assert executed == plan[: len(executed)]  # nothing after the restart
+    assert list(executed) == list(plan[: len(executed)])  # nothing after the restart
 
 
 def test_a_restarted_device_that_somebody_enabled_again_is_still_another_boot():
@@ -248,6 +248,33 @@ def test_a_restarted_device_that_somebody_enabled_again_is_still_another_boot():
     with pytest.raises(StreamError, match=r"the device restarted: its count .*position lost") as caught:
         stream_plan(line, motion(300))
     assert caught.value.position.certainty is Certainty.LOST
+
+
+def test_the_keyboard_stops_the_sending_and_the_position_is_exact():
+    """Nothing more is sent; the device runs what it has, and the host waits for that and tells what was executed."""
+    line, plan = ModelLine(), motion(300)
+
+    def stop_early(told):
+        if told.executed_segments >= 40:
+            raise KeyboardInterrupt
+
+    with pytest.raises(StreamError, match=r"stopped by the keyboard.*position exact") as stopped:
+        stream_plan(line, plan, stop_early)
+    executed = line.device.segments_executed
+    assert 40 <= len(executed) < len(plan)
+    assert list(executed) == list(plan[: len(executed)])
+    assert stopped.value.position.executed_segments == (len(executed), len(executed))
+
+
+def test_the_keyboard_before_the_motion_is_just_that():
+    line = ModelLine()
+    line.write = raise_keyboard_interrupt
+    with pytest.raises(KeyboardInterrupt):
+        stream_plan(line, motion(3))
+
+
+def raise_keyboard_interrupt(_data):
+    raise KeyboardInterrupt
 
 
 def test_a_cut_line_bounds_the_position():
@@ -313,7 +340,7 @@ def test_a_line_that_cannot_carry_the_plan_ends_in_an_underrun_with_the_exact_po
     with pytest.raises(StreamFault, match=r"ran empty.*raise the baud rate.*position exact"):
         stream_plan(line, plan)
     executed = tuple(line.device.segments_executed)
-    assert executed == plan[: len(executed)]
+    assert list(executed) == list(plan[: len(executed)])
 
 
 def test_another_version_or_specification_is_refused_before_anything_is_sent():

@@ -8,7 +8,7 @@ import json
 import os
 import sys
 from collections.abc import Sequence
-from typing import NoReturn, TypeAlias
+from typing import Any, NoReturn, TypeAlias
 
 import planarm
 from planarm.errors import OutputError, PlanarmError
@@ -72,7 +72,10 @@ class UsageError(PlanarmError):
 
 
 class _Parser(argparse.ArgumentParser):
-    """A parser whose errors are told like all others."""
+    """A parser that keeps the exit codes' table as it is, and whose errors are told like all others."""
+
+    def __init__(self, **settings: Any) -> None:
+        super().__init__(formatter_class=argparse.RawDescriptionHelpFormatter, **settings)
 
     def error(self, message: str) -> NoReturn:
         raise UsageError(f"{message}; '{self.prog} --help' tells what there is")
@@ -84,7 +87,6 @@ def build_parser() -> argparse.ArgumentParser:
         prog="planarm",
         description="From a scene file to proven step pulses on an Arduino Uno.",
         epilog=EXIT_CODES,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("--version", action="version", version=f"planarm {planarm.__version__}")
     commands = parser.add_subparsers(dest="command", metavar="COMMAND", required=True)

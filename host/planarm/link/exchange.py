@@ -62,7 +62,8 @@ def stream_plan(
     Raises LinkError (StreamError once the motion has begun) when the line fails, DeviceFault (StreamFault) when the
     device latches a fault or refuses, StepsDifferError when the ledger does not show the plan's steps, and
     CertificateError when `segments` are no whole motion. Stream errors carry a `position`. Without segments the arm is
-    where it should be: the device is asked for its ledger, and nothing is enabled.
+    where it should be: the device is asked for its ledger, and nothing is enabled. Ctrl-C during a motion ends in a
+    StreamError, after the board has come to rest; a second Ctrl-C does not wait for that.
     """
     began_s = transport.clock.now_s()
     if not segments:
@@ -73,6 +74,13 @@ def stream_plan(
     stream = Stream(session, segments, options, on_progress)
     try:
         _drive(transport, session, lambda: stream.done, stream)
+    except KeyboardInterrupt as stop:
+        if stream.ledger_before is None:
+            raise
+        # The wire has no stop yet: what is queued runs on, and then the device latches an underrun.
+        position, _ = _find_position(transport, session, stream)
+        told = "stopped by the keyboard: nothing more was sent, the board ran what it had and stopped abruptly"
+        raise StreamError(told, position) from stop
     except (LinkError, DeviceFault) as error:
         if stream.ledger_before is None:  # nothing was queued yet, so nothing moved
             raise
