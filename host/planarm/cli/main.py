@@ -74,7 +74,7 @@ class UsageError(PlanarmError):
 class _Parser(argparse.ArgumentParser):
     """A parser that keeps the exit codes' table as it is, and whose errors are told like all others."""
 
-    def __init__(self, **settings: Any) -> None:
+    def __init__(self, **settings: Any) -> None:  # noqa: ANN401 - handed on as they are
         super().__init__(formatter_class=argparse.RawDescriptionHelpFormatter, **settings)
 
     def error(self, message: str) -> NoReturn:
