@@ -101,12 +101,18 @@ def test_reversals_are_found_between_gridpoints():
     assert train.steps[0].ticks + train.steps[0].ticks[::-1] == pytest.approx(np.full(80, TICKS_HZ), abs=1)
 
 
-def test_a_joint_that_is_too_fast_is_named_with_its_limit_and_setting():
-    fast = joint(speed=20.0, acceleration=400.0)  # 50.9 k steps/s
+@pytest.mark.parametrize(
+    ("speed_rad_s", "words"),
+    [
+        (10.0, r"joint 2 would step after \d+ ticks \(2\d{4} steps/s\) .* 800 \(20000 steps/s\)"),
+        (20.0, r"joint 2 would make \d{5} steps/s at .* can make 20000"),
+    ],
+)
+def test_a_joint_that_is_too_fast_is_named_with_its_limit_and_setting(speed_rad_s, words):
+    """2546 micro-steps a radian: 25.5 k steps/s are found at the step, 50.9 k before any step is located."""
+    fast = joint(speed=speed_rad_s, acceleration=400.0)
     made = time_path(joint_line((0.0, 0.0), (0.1, 2.0)), [fast, fast])
-    with pytest.raises(
-        TimingError, match=r"joint 2 .* 800 \(20000 steps/s\): lower joints\[2\].max_speed_deg_s to at most 450"
-    ):
+    with pytest.raises(TimingError, match=words + r": lower joints\[2\].max_speed_deg_s to at most 450"):
         quantise(made, [fast, fast])
 
 

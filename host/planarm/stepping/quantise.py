@@ -19,6 +19,7 @@ from planarm.errors import TimingError
 from planarm.model.arm import Arm
 from planarm.scene import JointSpec
 from planarm.stepping.train import (
+    LARGEST_RATE_HZ,
     MIN_REVERSAL_TICKS,
     Directions,
     Floats,
@@ -26,6 +27,7 @@ from planarm.stepping.train import (
     StepTrain,
     Ticks,
     require_steppable,
+    slower,
     to_usteps,
 )
 from planarm.trajectory.motion import Trajectory
@@ -53,6 +55,7 @@ def quantise(trajectory: Trajectory, joints: Sequence[JointSpec]) -> StepTrain:
         TimingError: a joint would have to step faster than the firmware can.
     """
     usteps_per_rad = np.array([joint.usteps_per_rad for joint in joints])
+    _require_possible_rates(trajectory, joints, usteps_per_rad)
     start = to_usteps(trajectory.q_rad[0], usteps_per_rad)
     s = _monotone_points(trajectory)
     steps = tuple(
@@ -64,6 +67,20 @@ def quantise(trajectory: Trajectory, joints: Sequence[JointSpec]) -> StepTrain:
     train = StepTrain(tuple(int(n) for n in start), steps, duration)
     require_steppable(train, joints)
     return train
+
+
+def _require_possible_rates(trajectory: Trajectory, joints: Sequence[JointSpec], usteps_per_rad: Floats) -> None:
+    """Refuse a motion far beyond the firmware's rate before its steps, perhaps millions, are located.
+
+    The exact verdict is that of `require_steppable`; gridpoints alone show only what is twice too fast or more.
+    """
+    rates_hz = np.abs(trajectory.sample(trajectory.t_s)[1]) * usteps_per_rad
+    point, j = np.unravel_index(int(rates_hz.argmax()), rates_hz.shape)
+    if rates_hz[point, j] > 2.0 * LARGEST_RATE_HZ:
+        raise TimingError(
+            f"joint {j + 1} would make {rates_hz[point, j]:.0f} steps/s at {trajectory.t_s[point]:.6f} s; the firmware "
+            f"can make {LARGEST_RATE_HZ:.0f}: {slower(int(j) + 1, joints)}"
+        )
 
 
 def quantisation_bound_cm(arm: Arm, joints: Sequence[JointSpec]) -> float:

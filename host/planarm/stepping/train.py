@@ -17,6 +17,9 @@ Floats = NDArray[np.float64]
 MIN_REVERSAL_TICKS = MIN_INTERVAL_TICKS + MIN_DIR_SETUP_TICKS
 """Least time between two steps of one joint in opposite directions: DIR changes in between and has its setup time."""
 
+LARGEST_RATE_HZ = TICKS_HZ / MIN_INTERVAL_TICKS
+"""Most steps of one joint in a second."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class JointSteps:
@@ -95,12 +98,16 @@ def _too_fast(number: int, steps: JointSteps, i: int, joints: Sequence[JointSpec
             f"joint {number} would reverse within {gap} ticks at {at_s:.6f} s; reversing takes {MIN_REVERSAL_TICKS}: "
             f"lower joints[{number}].max_acceleration_deg_s2"
         )
-    largest = TICKS_HZ / MIN_INTERVAL_TICKS
-    advice = f"lower joints[{number}].max_speed_deg_s"
-    if joints is not None:
-        fastest_deg_s = np.degrees(largest / joints[number - 1].usteps_per_rad)
-        advice += f" to at most {fastest_deg_s:.6g}, or its microsteps or gear_ratio"
     return (
         f"joint {number} would step after {gap} ticks ({TICKS_HZ / max(gap, 1):.0f} steps/s) at {at_s:.6f} s; the "
-        f"firmware needs {MIN_INTERVAL_TICKS} ({largest:.0f} steps/s): {advice}"
+        f"firmware needs {MIN_INTERVAL_TICKS} ({LARGEST_RATE_HZ:.0f} steps/s): {slower(number, joints)}"
     )
+
+
+def slower(number: int, joints: Sequence[JointSpec] | None) -> str:
+    """Say which setting slows a joint down to what the firmware can step."""
+    advice = f"lower joints[{number}].max_speed_deg_s"
+    if joints is None:
+        return advice
+    fastest_deg_s = np.degrees(LARGEST_RATE_HZ / joints[number - 1].usteps_per_rad)
+    return f"{advice} to at most {fastest_deg_s:.6g}, or its microsteps or gear_ratio"
