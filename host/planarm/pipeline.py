@@ -8,26 +8,27 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from contextlib import closing
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from planarm.analysis.step_count import MeasuredSteps, StepComparison, Waveform, compare_steps, measure_steps
+from planarm.analysis.step_count import Waveform, compare_steps, measure_steps
 from planarm.errors import CertificateError, NoPathError, SceneError, StepsDifferError, TimingError
 from planarm.link.exchange import StreamResult, stream_plan
 from planarm.link.transport import PinTrace, Transport, open_transport
 from planarm.model.arm import Arm
+from planarm.plan import Findings, Plan
 from planarm.plan_file import StoredPlan
 from planarm.run_folder import begin_run_folder, finish_run_folder
 from planarm.scene import Scene
 from planarm.search.grid_search import find_path
 from planarm.search.path import Path as TipPath
-from planarm.smoothing.blend import SmoothPath, blend_corners
+from planarm.smoothing.blend import blend_corners
 from planarm.stepping.certify import Certificate, certify
-from planarm.stepping.quantise import StepTrain, quantisation_bound_cm, quantise
+from planarm.stepping.quantise import quantisation_bound_cm, quantise
 from planarm.stepping.segments import SegmentPlan, compress, expand
 from planarm.summary import summarise
-from planarm.trajectory.timing import Trajectory, time_path
+from planarm.trajectory.timing import time_path
 from planarm.workspace.check_task import check_task
 from planarm.workspace.free_map import FreeMap, build_free_map
 from planarm.workspace.world import elbow_sides
@@ -38,32 +39,6 @@ Notice = Callable[[str, float], None]
 
 LONGEST_MOTION_S = 600.0
 """The certificate looks at a motion every 0.1 ms; beyond ten minutes that takes gigabytes."""
-
-
-@dataclass(frozen=True, slots=True)
-class Plan:
-    """Everything from a scene to certified segments, each stage's value kept for the report."""
-
-    scene: Scene
-    free_map: FreeMap
-    path: TipPath
-    smooth_path: SmoothPath
-    trajectory: Trajectory
-    train: StepTrain
-    segments: SegmentPlan
-    certificate: Certificate
-    plan_ms: float
-    """Wall time of the whole planning, certificate included."""
-    search_ms: float
-    """Wall time of the grid search alone."""
-
-
-@dataclass(frozen=True, slots=True)
-class Findings:
-    """What the pins showed, held against the plan."""
-
-    measured: tuple[MeasuredSteps, ...]
-    comparison: StepComparison
 
 
 def plan_scene(scene: Scene, notice: Notice) -> Plan:

@@ -19,7 +19,7 @@ from planarm_wire.messages import MIN_INTERVAL_TICKS, TICKS_HZ
 
 if TYPE_CHECKING:
     from planarm.link.transport import PinTrace
-    from planarm.pipeline import Plan
+    from planarm.plan import Plan
 
 POSES_SHOWN = 7
 CURVE_POINTS = 600

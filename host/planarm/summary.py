@@ -13,7 +13,7 @@ from planarm_wire.messages import TICKS_HZ
 
 if TYPE_CHECKING:
     from planarm.link.exchange import StreamResult
-    from planarm.pipeline import Findings, Plan
+    from planarm.plan import Findings, Plan
 
 
 def summarise(plan: Plan, streamed: StreamResult, findings: Findings | None) -> dict[str, Any]:
