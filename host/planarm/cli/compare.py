@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 from planarm.cli.progress import progress
 from planarm.cli.scenes import tell_first_compile
+from planarm.cli.terminal import terminal
 from planarm.output import writing
 
 if TYPE_CHECKING:
@@ -43,11 +44,9 @@ def execute(options: argparse.Namespace) -> int:
 
 
 def _print(result: Table2, out: Path | None) -> None:
-    from rich.console import Console
-
     from planarm.experiments.table2_tables import assumptions, findings, tables
 
-    console = Console()
+    console = terminal()
     _print_sentences(console, "What is assumed", assumptions(result))
     for one in tables(result):
         console.print(_shown(one))

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from planarm.cli.progress import progress
 from planarm.cli.scenes import chosen_scene, tell_first_compile
+from planarm.cli.terminal import terminal
 
 
 def execute(options: argparse.Namespace) -> int:
@@ -31,10 +32,8 @@ def execute(options: argparse.Namespace) -> int:
 
 
 def _print(summary: dict[str, object], out: Path) -> None:
-    from rich.console import Console
-
     from planarm.report import summary_table
 
-    console = Console()
+    console = terminal()
     console.print(summary_table(summary))
     console.print(f"plan, trace, summary and pictures: {out}", markup=False)  # brackets in names are names
