@@ -63,7 +63,9 @@ def test_drivers_are_released_at_once_and_nothing_else_moves() -> None:
     assert uno.pin(ENABLE_PIN).level == 1
     uno.run(cycles=BOOT_CYCLES)
     assert uno.pin(ENABLE_PIN).level == 1
-    assert [len(uno.edges(pin)) for pin in (ENABLE_PIN, *STEP_PINS, *DIR_PINS)] == [0] * 5
+    assert uno.edges(ENABLE_PIN)["level"].tolist() == [1], "the pull-up, and high ever since"
+    assert uno.edges(ENABLE_PIN)["cycle"][0] <= RESET_TO_PINS_CYCLES
+    assert [len(uno.edges(pin)) for pin in (*STEP_PINS, *DIR_PINS)] == [0] * 4
 
 
 def test_every_reset_gives_another_nonce() -> None:

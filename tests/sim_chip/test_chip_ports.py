@@ -20,14 +20,21 @@ def run(source: str, cycles: int = 10_000) -> Chip:
 
 
 def test_outputs_change_at_the_end_of_the_instruction():
-    # LDI 1, OUT DDRB 2, OUT PORTB 3, SBI 5, CBI 7, STS 9.
+    # LDI 1, OUT DDRB 2, OUT PORTB 3, SBI 5, CBI 7, STS 9. PB1 is an input: SBI pulls it up, STS lets it go.
     chip = run("ldi r16, 0x21\nout 0x04, r16\nout 0x05, r16\nsbi 0x05, 1\ncbi 0x05, 5\nsts 0x25, r16\nbreak")
-    assert edges(chip) == [(3, 0, 1), (3, 5, 1), (7, 5, 0), (9, 5, 1)]
+    assert edges(chip) == [(3, 0, 1), (3, 5, 1), (5, 1, 1), (7, 5, 0), (9, 1, 0), (9, 5, 1)]
 
 
 def test_a_pin_that_becomes_an_output_is_an_edge_only_when_its_level_changes():
-    chip = run("sbi 0x05, 0\nsbi 0x04, 0\nsbi 0x04, 1\ncbi 0x05, 0\nbreak")  # the pull-up held PB0 high already
-    assert edges(chip) == [(8, 0, 0)]
+    chip = run("sbi 0x05, 0\nsbi 0x04, 0\nsbi 0x04, 1\ncbi 0x05, 0\nbreak")  # the pull-up holds PB0 high from 2 on
+    assert edges(chip) == [(2, 0, 1), (8, 0, 0)]
+
+
+def test_what_the_outside_does_to_an_input_is_no_edge_of_the_chip():
+    chip = Chip(assemble("nop\nnop\nnop\nnop\nbreak"))
+    chip.drive_pin(PB0, 1, 2)
+    chip.run_to(100)
+    assert edges(chip) == []
 
 
 def test_sbi_on_pinx_toggles_one_pin_only():

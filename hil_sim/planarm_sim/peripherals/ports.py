@@ -57,7 +57,7 @@ INT0_PIN = 1 << 2  # PD2; INT1 is PD3
 
 @kernel
 def log_edge(st: State, cycle: int, pin: int, level: int) -> None:
-    """Append an edge of an output pin to the log; ask the CPU loop to stop when the log is nearly full."""
+    """Append an edge that the chip made, by driving or pulling up, to the log; ask the CPU loop to stop when the log is nearly full."""
     count = st[EDGE_COUNT]
     st[st[EDGE_BASE] + count] = (cycle << 8) | (pin << 1) | level
     st[EDGE_COUNT] = count + 1
@@ -83,7 +83,7 @@ def refresh_port(st: State, port: int, cycle: int) -> None:
             st[LEVEL_BEFORE + port] = before
             st[CHANGED_AT + port] = cycle
         st[LEVEL + port] = level
-        logged = changed & (direction | st[DIRECTION + port])
+        logged = changed & (direction | st[DIRECTION + port] | ~outside)  # pull-ups are seen outside, too
         bit = 0
         while logged != 0:
             if logged & 1:
