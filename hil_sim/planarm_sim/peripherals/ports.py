@@ -57,7 +57,7 @@ INT0_PIN = 1 << 2  # PD2; INT1 is PD3
 
 @kernel
 def log_edge(st: State, cycle: int, pin: int, level: int) -> None:
-    """Append an edge that the chip made, by driving or pulling up, to the log; ask the CPU loop to stop when the log is nearly full."""
+    """Log an edge that the chip made, by driving or pulling up; stop the CPU loop when the log is nearly full."""
     count = st[EDGE_COUNT]
     st[st[EDGE_BASE] + count] = (cycle << 8) | (pin << 1) | level
     st[EDGE_COUNT] = count + 1
