@@ -176,8 +176,8 @@ def read_io(chip: Chip, address: int) -> int:
     """What the program would read now: run one IN in place of its next instruction, on a copy of the chip."""
     probe = Chip(assemble(f"nop\nin r0, {address - 0x20}"))
     snapshot = chip.snapshot()
-    flash, code = probe.snapshot().flash, probe.snapshot().code
-    probe.restore(type(snapshot)(snapshot.state, snapshot.sram, snapshot.eeprom, flash, code, snapshot.queues))
+    program = probe.snapshot().program
+    probe.restore(type(snapshot)(snapshot.state, snapshot.sram, snapshot.eeprom, program, snapshot.queues))
     probe.pc = 1
     probe.run_to(chip.cycle + 1)
     return int(probe.registers[0])

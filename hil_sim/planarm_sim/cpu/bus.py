@@ -55,6 +55,7 @@ from planarm_sim.cpu.registers import (
     READS_PLAIN,
     SMCR,
     SPL,
+    SPMCSR,
     SRAM_END,
     SRAM_START,
     SREG,
@@ -77,6 +78,7 @@ from planarm_sim.cpu.registers import (
 )
 from planarm_sim.peripherals.eeprom import read_control, write_control
 from planarm_sim.peripherals.ports import PUD, read_pins, refresh_port, write_port
+from planarm_sim.peripherals.self_programming import BLBSET, SIGRD, write_spm_control
 from planarm_sim.peripherals.timer_registers import (
     read_count8,
     read_timer1,
@@ -159,7 +161,7 @@ def read_io(st: State, eeprom: Bytes, address: int) -> int:  # noqa: PLR0911 - o
         return read_timer_flags(st, address, cycle)
     if address == UDR0:
         return read_data(st)
-    if address in (UCSR0A, UCSR0B, PCIFR, EIFR, WDTCSR):
+    if address in (UCSR0A, UCSR0B, PCIFR, EIFR, WDTCSR, SPMCSR):
         return int(st[address])
     if address == EECR:
         return read_control(st, cycle)
@@ -225,6 +227,10 @@ def write_rare_io(st: State, eeprom: Bytes, address: int, value: int, cycle: int
         write_prescaler_control(st, value, cycle)
     elif address == MCUCR:
         write_mcu_control(st, value, cycle)
+    elif address == SPMCSR:
+        write_spm_control(st, value, cycle)
+        if value & (SIGRD | BLBSET):
+            touch(st, address)  # signature, fuses and lock bits are not modelled
     else:
         touch(st, address)
         st[address] = value

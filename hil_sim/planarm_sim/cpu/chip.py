@@ -17,11 +17,14 @@ from numpy.typing import NDArray
 from planarm_sim.cpu import layout as at
 from planarm_sim.cpu import queues, service
 from planarm_sim.cpu import registers as reg
-from planarm_sim.cpu.decode import FLASH_BYTES, decode
+from planarm_sim.cpu.decode import FLASH_BYTES
 from planarm_sim.cpu.dispatch import run
+from planarm_sim.cpu.program import Program
+from planarm_sim.cpu.service import stand_still
 from planarm_sim.errors import ImageError, PinError, UsageError
 from planarm_sim.peripherals.eeprom import EEPROM_BYTES
 from planarm_sim.peripherals.ports import drive_from_outside, refresh_port
+from planarm_sim.peripherals.self_programming import RWWSB, erase_buffer, execute_spm
 from planarm_sim.peripherals.timer_registers import power_up_timers
 from planarm_sim.peripherals.usart import RXEN, UDRE, plan_receiver
 from planarm_sim.peripherals.watchdog import WDE, plan_watchdog
@@ -60,7 +63,9 @@ TX_DTYPE: Final = np.dtype([("cycle", np.int64), ("byte", np.uint16), ("bit_cycl
 
 PINS: Final = 24
 SRAM_BYTES: Final = reg.SRAM_END - reg.SRAM_START
-_BOOT_START_WORD = 0x3F00  # BOOTSZ = 11, 256 words, as on an Arduino Uno (datasheet, table 27-13)
+BOOT_WORDS: Final = (256, 512, 1024, 2048)
+"""Sizes of the boot section that the fuses BOOTSZ choose from (datasheet, table 27-13)."""
+_FLASH_WORDS = FLASH_BYTES // 2
 _STOPS = {
     service.REACHED: StopCause.REACHED,
     service.AT_BREAK: StopCause.BREAK,
@@ -76,8 +81,7 @@ class Snapshot:
     state: NDArray[np.int64]
     sram: NDArray[np.uint8]
     eeprom: NDArray[np.uint8]
-    flash: NDArray[np.uint8]
-    code: NDArray[np.int64]
+    program: Program
     queues: tuple[NDArray[np.int64], ...]
 
 
@@ -99,21 +103,31 @@ class FirstTouch:
 class Chip:
     """ATmega328P. Pins are numbered port * 8 + bit with B = 0, C = 1, D = 2 (PB1 is 1, PD1 is 17)."""
 
-    def __init__(self, flash: bytes) -> None:
+    def __init__(self, flash: bytes, *, boot_words: int = BOOT_WORDS[0], boot_reset: bool = False) -> None:
         """Load a program image of up to 32 KiB and power up; the rest of the flash is erased (0xFF).
+
+        Args:
+            flash: the image, from address 0 on.
+            boot_words: size of the boot section at the end of the flash (fuses BOOTSZ), one of BOOT_WORDS.
+            boot_reset: every reset leads to the boot section (fuse BOOTRST programmed); erased words then run as
+                `Program.erased_runs` tells.
 
         Raises:
             ImageError: the image is larger than the flash.
+            UsageError: the fuses know no such boot section.
         """
+        if boot_words not in BOOT_WORDS:
+            raise UsageError(f"a boot section of {boot_words} words: the fuses BOOTSZ choose from {BOOT_WORDS}")
         if len(flash) > FLASH_BYTES:
             raise ImageError(f"the program has {len(flash)} bytes, the ATmega328P's flash {FLASH_BYTES}")
-        self._flash = np.full(FLASH_BYTES, 0xFF, dtype=np.uint8)
-        self._flash[: len(flash)] = np.frombuffer(flash, dtype=np.uint8)
-        self._code = decode(self._flash)
+        whole = np.full(FLASH_BYTES, 0xFF, dtype=np.uint8)
+        whole[: len(flash)] = np.frombuffer(flash, dtype=np.uint8)
+        self._program = self._seen = Program.of(whole, erased_runs=boot_reset)  # _seen: by the CPU, now
         self._sram = np.zeros(SRAM_BYTES, dtype=np.uint8)
         self._eeprom = np.full(EEPROM_BYTES, 0xFF, dtype=np.uint8)
         state = np.zeros(at.QUEUES, dtype=np.int64)
-        state[at.BOOT_START] = _BOOT_START_WORD
+        state[at.BOOT_START] = _FLASH_WORDS - boot_words
+        state[at.BOOT_RESET] = boot_reset
         nothing = np.empty(0, dtype=np.int64)
         self._state = queues.allocate(state, (nothing,) * len(queues.ALL))
         self.reset(ResetCause.POWER_ON)
@@ -131,7 +145,7 @@ class Chip:
         After BREAK a further call goes on behind it; at an undefined opcode it stops again, with `pc` on it.
         """
         while True:
-            cause = int(run(self._state, self._sram, self._eeprom, self._code, self._flash, cycle))
+            cause = self._advance(cycle)
             if cause in _STOPS:
                 return _STOPS[cause]
             if cause == service.LOG_FULL:
@@ -139,7 +153,22 @@ class Chip:
             elif cause == service.RESET_WANTED:
                 self.reset(ResetCause(int(self._state[at.RESET_REQUEST])))
             else:
-                self._self_program()
+                self._program = execute_spm(self._state, self._program)
+                self._look_at_flash()
+
+    def _advance(self, target: int) -> int:
+        """Run, first without the CPU while it stands still; returns one of `service`'s stops."""
+        halted_until = int(self._state[at.SPM_HALT_UNTIL])
+        if halted_until > self.cycle:
+            cause = int(stand_still(self._state, self._eeprom, min(halted_until, target)))
+            if cause != service.REACHED or self.cycle >= target:
+                return cause
+        return int(run(self._state, self._sram, self._eeprom, self._seen.code, self._seen.flash, target))
+
+    def _look_at_flash(self) -> None:
+        """Let the CPU see the flash as it is now, without the RWW section while that is blocked."""
+        blocked = self._state[reg.SPMCSR] & RWWSB
+        self._seen = self._program.rww_blocked() if blocked else self._program
 
     def reset(self, cause: ResetCause = ResetCause.POWER_ON) -> None:
         """Reset the chip now. SRAM keeps its contents except at power-on; queued serial input stays queued.
@@ -153,18 +182,22 @@ class Chip:
         st[at.CONSTANTS :] = old[at.CONSTANTS :]
         kept = [at.CYCLE, at.TX_BASE, at.TX_COUNT, at.TX_LIMIT, at.EDGE_BASE, at.EDGE_COUNT, at.EDGE_LIMIT]
         kept += [at.RX_BASE, at.RX_HEAD, at.RX_TAIL, at.IN_BASE, at.IN_HEAD, at.IN_TAIL, at.BOOT_START]
+        kept += [at.BOOT_RESET]
         kept += [at.OUTSIDE_ADDRESS, at.OUTSIDE_PC, *range(at.LEVEL, at.PIPE), *range(at.TOUCHED, at.TOUCHED + 256)]
         st[kept] = old[kept]
         st[at.OVERRIDE : at.EXTERNAL] = 0
         st[at.DUE : at.DUE + at.DUE_SOURCES] = at.NEVER
         st[at.DUE_INPUT] = old[at.DUE_INPUT] if st[at.IN_HEAD] < st[at.IN_TAIL] else at.NEVER
         st[at.SP] = reg.SRAM_END - 1
+        st[at.PC] = st[at.BOOT_START] if st[at.BOOT_RESET] else 0
         st[reg.MCUSR] = causes | int(cause)
         st[reg.UCSR0A] = UDRE
         st[reg.UCSR0C] = 0x06
         st[[at.PRESCALER_01, at.PRESCALER_2, at.BAUD_ORIGIN, at.RX_READY, at.WDT_ORIGIN]] = now
         self._state = st
         power_up_timers(st)
+        erase_buffer(st)
+        self._look_at_flash()
         if cause == ResetCause.POWER_ON:
             self._sram[:] = 0
         if st[reg.MCUSR] & ResetCause.WATCHDOG:
@@ -285,14 +318,15 @@ class Chip:
         st = self._state
         state = st[: at.STATE_WORDS].copy()
         entries = queues.contents(st)
-        return Snapshot(state, self._sram.copy(), self._eeprom.copy(), self._flash, self._code, entries)
+        return Snapshot(state, self._sram.copy(), self._eeprom.copy(), self._program, entries)
 
     def restore(self, snapshot: Snapshot) -> None:
         """Go back to `snapshot`, of this chip or of another with any program; the same run follows."""
         self._state = queues.refill(self._state, snapshot.state, snapshot.queues)
         self._sram[:] = snapshot.sram
         self._eeprom[:] = snapshot.eeprom
-        self._flash, self._code = snapshot.flash, snapshot.code
+        self._program = snapshot.program
+        self._look_at_flash()
 
     def unmodelled(self) -> tuple[FirstTouch, ...]:
         """Return the registers of parts that are not modelled which the program touched, by address."""
@@ -353,16 +387,8 @@ class Chip:
     @property
     def flash(self) -> NDArray[np.uint8]:
         """The program memory; not to be written to."""
-        return self._flash
+        return self._program.flash
 
     def _check_pin(self, pin: int) -> None:
         if not 0 <= pin < PINS:
             raise PinError(f"pin {pin}: the ATmega328P's pins are numbered 0 to {PINS - 1} (port * 8 + bit)")
-
-    def _self_program(self) -> None:
-        """SPM: flash programming by the program itself is not modelled; note it and go on behind."""
-        st = self._state
-        if st[at.TOUCHED + reg.SPMCSR] == 0:
-            st[at.TOUCHED + reg.SPMCSR] = st[at.PC] + 1
-        st[at.PC] += 1
-        st[at.CYCLE] += 1

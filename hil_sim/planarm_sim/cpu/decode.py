@@ -35,6 +35,7 @@ FLASH_BYTES = 32 * 1024
 FLASH_WORDS = FLASH_BYTES // 2
 PC_MASK = FLASH_WORDS - 1
 X, Y, Z = 26, 28, 30
+ERASED_WORD, ERASED_RUNS_AS = 0xFFFF, 0xFFF7  # SBRS r31, 7 with its unused bit 3 cleared
 
 _Words = NDArray[np.int64]
 
@@ -176,30 +177,40 @@ class Encoding:
 ENCODINGS: tuple[Encoding, ...] = tuple(Encoding.parse(*line) for line in _ENCODINGS)
 
 
-def decode(flash: NDArray[np.uint8]) -> NDArray[np.int64]:
-    """Decode FLASH_BYTES of program memory.
+def decode(flash: NDArray[np.uint8], *, erased_runs: bool = False) -> NDArray[np.int64]:
+    """Decode FLASH_BYTES of program memory; `erased_runs` as in `Program`.
 
     Returns FLASH_WORDS decoded words and two WRAP words, on which a program lands that runs or skips over the
     end of the flash; the program counter starts again at 0 there.
     """
-    words = flash.view("<u2").astype(np.int64)
-    following = np.roll(words, -1)
-    code = np.full(FLASH_WORDS + 2, op.UNDEFINED, dtype=np.int64)
-    code[FLASH_WORDS:] = op.WRAP
-    length = np.ones(FLASH_WORDS, dtype=np.int64)
-    skips = np.zeros(FLASH_WORDS, dtype=np.bool_)
+    code = np.full(FLASH_WORDS + 2, op.WRAP, dtype=np.int64)
+    code[:FLASH_WORDS] = decode_part(flash, np.arange(FLASH_WORDS), erased_runs=erased_runs)
+    return code
+
+
+def decode_part(flash: NDArray[np.uint8], part: _Words, *, erased_runs: bool) -> NDArray[np.int64]:
+    """Decode the words at the addresses `part`, which follow one another and may go on at 0 behind the last."""
+    memory = flash.view("<u2").astype(np.int64)
+    places = np.append(part, (part[-1] + 1) & PC_MASK)
+    words = memory[places]
+    if erased_runs:
+        words[words == ERASED_WORD] = ERASED_RUNS_AS
+    following = memory[(places + 1) & PC_MASK]
+    code = np.full(len(places), op.UNDEFINED, dtype=np.int64)
+    length = np.ones(len(places), dtype=np.int64)
+    skips = np.zeros(len(places), dtype=np.bool_)
     for encoding in ENCODINGS:
         at = np.nonzero((words & encoding.mask) == encoding.value)[0]
-        d, r, k = _operands(encoding, words[at], following[at], at)
+        d, r, k = _operands(encoding, words[at], following[at], places[at])
         operation, d, k = _specialised(encoding.operation, d, r, k)
         code[at] = operation | (d << 8) | (r << 16) | (k << 32)
         if encoding.operation in _TWO_WORDS:
             length[at] = 2
         elif encoding.operation in _SKIPS:
             skips[at] = True
-    at = np.nonzero(skips)[0]
-    code[at] |= length[(at + 1) & PC_MASK] << 32
-    return code
+    at = np.nonzero(skips[:-1])[0]
+    code[at] |= length[at + 1] << 32
+    return code[:-1]
 
 
 def _operands(encoding: Encoding, word: _Words, following: _Words, address: _Words) -> tuple[_Words, _Words, _Words]:

@@ -11,6 +11,7 @@ from planarm_sim.cpu.layout import (
     DUE_PIPE,
     DUE_RX,
     DUE_SOURCES,
+    DUE_SPM,
     DUE_TIMER2,
     DUE_TX,
     DUE_WATCHDOG,
@@ -29,6 +30,7 @@ from planarm_sim.cpu.layout import (
 from planarm_sim.peripherals.eeprom import finish_write
 from planarm_sim.peripherals.external import capture, deliver_inputs
 from planarm_sim.peripherals.ports import drive_from_outside
+from planarm_sim.peripherals.self_programming import end_command
 from planarm_sim.peripherals.timers import advance_timer, plan_timer
 from planarm_sim.peripherals.usart import end_frame, receive_event
 from planarm_sim.peripherals.watchdog import watchdog_timeout
@@ -78,6 +80,8 @@ def happen(st: State, eeprom: Bytes, source: int, cycle: int) -> None:
         finish_write(st, eeprom)
     elif source == DUE_WATCHDOG:
         watchdog_timeout(st, cycle)
+    elif source == DUE_SPM:
+        end_command(st)
 
 
 @kernel

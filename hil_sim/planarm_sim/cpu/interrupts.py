@@ -11,6 +11,7 @@ from planarm_sim.cpu.registers import (
     EIMSK,
     PCICR,
     PCIFR,
+    SPMCSR,
     TIFR0,
     TIFR1,
     TIFR2,
@@ -23,6 +24,7 @@ from planarm_sim.cpu.registers import (
 )
 from planarm_sim.peripherals.eeprom import EEPE, EERIE
 from planarm_sim.peripherals.ports import PORT_D
+from planarm_sim.peripherals.self_programming import SELFPRGEN, SPMIE
 from planarm_sim.peripherals.timers import ICF, OCF_A, OCF_B, TOV
 from planarm_sim.peripherals.usart import RXC, TXC, UDRE
 from planarm_sim.peripherals.watchdog import WDE, WDIE, WDIF
@@ -35,6 +37,7 @@ TIMER1_CAPT, TIMER1_COMPA, TIMER1_COMPB, TIMER1_OVF = 10, 11, 12, 13
 TIMER0_COMPA, TIMER0_COMPB, TIMER0_OVF = 14, 15, 16
 USART_RX, USART_UDRE, USART_TX = 18, 19, 20
 EE_READY = 22
+SPM_READY = 25
 ENTRY_CYCLES, WAKE_CYCLES = 4, 4
 
 
@@ -62,6 +65,8 @@ def pending_interrupts(st: State) -> int:
         pending |= ((usart & TXC) >> 6) << USART_TX
     if st[EECR] & EERIE and st[EECR] & EEPE == 0:
         pending |= 1 << EE_READY
+    if st[SPMCSR] & (SPMIE | SELFPRGEN) == SPMIE:
+        pending |= 1 << SPM_READY
     return int(pending)
 
 
@@ -87,7 +92,7 @@ def lowest_bit(mask: int) -> int:
 def acknowledge(st: State, vector: int) -> bool:
     """Clear what the hardware clears when the vector is taken; False where the request stays, or may stay.
 
-    RXC, UDRE, EE_READY and low levels of INT0 and INT1 ask until their cause is gone.
+    RXC, UDRE, EE_READY, SPM_READY and low levels of INT0 and INT1 ask until their cause is gone.
     """
     if vector <= INT1:
         st[EIFR] &= ~(1 << (vector - INT0))

@@ -40,6 +40,7 @@ UNKNOWN = -1
     ASLEEP,  # 0 awake, else 1 + sleep mode (SM2:0)
     RESET_REQUEST,  # bits of MCUSR of a reset that a peripheral asks for
     BOOT_START,  # word address of the boot section, where vectors go when IVSEL is set
+    BOOT_RESET,  # 1 when resets lead there (fuse BOOTRST programmed)
     ACCESS,  # what the instruction that just ended wants from I/O, and the particulars (see `access`)
     ACCESS_ADDRESS,
     ACCESS_VALUE,
@@ -47,13 +48,15 @@ UNKNOWN = -1
     IVCE_UNTIL,  # last cycle at which IVSEL may be changed
     OUTSIDE_ADDRESS,  # first data address beyond the chip's memory that was used, plus 1
     OUTSIDE_PC,
-    # --- Watchdog, EEPROM ---
+    # --- Watchdog, EEPROM, self-programming ---
     WDT_ORIGIN,
     WDT_CHANGE_UNTIL,
     EE_WRITE_UNTIL,
     EE_BUSY_ADDRESS,
     EE_BUSY_DATA,
     EE_BUSY_MODE,
+    SPM_BUSY,  # 1 while a page of the flash is erased or written
+    SPM_HALT_UNTIL,  # the CPU stands still until then: the page is in the section that it runs from
     # --- Shared prescalers of the timers ---
     PRESCALER_01,  # cycle of the last reset of the prescaler of timers 0 and 1
     PRESCALER_2,
@@ -93,13 +96,23 @@ UNKNOWN = -1
     IN_HEAD,
     IN_TAIL,
     _CPU_END,
-) = range(256, 256 + 58)
+) = range(256, 256 + 61)
 
 # --- When each source of events is due ----------------------------------------------------------------------
-(DUE_TIMER0, DUE_TIMER1, DUE_TIMER2, DUE_TX, DUE_RX, DUE_PIPE, DUE_INPUT, DUE_CAPTURE, DUE_EEPROM, DUE_WATCHDOG) = (
-    range(_CPU_END, _CPU_END + 10)
-)
-DUE, DUE_SOURCES = DUE_TIMER0, 10
+(
+    DUE_TIMER0,
+    DUE_TIMER1,
+    DUE_TIMER2,
+    DUE_TX,
+    DUE_RX,
+    DUE_PIPE,
+    DUE_INPUT,
+    DUE_CAPTURE,
+    DUE_EEPROM,
+    DUE_WATCHDOG,
+    DUE_SPM,
+) = range(_CPU_END, _CPU_END + 11)
+DUE, DUE_SOURCES = DUE_TIMER0, 11
 
 # --- Ports, one word each for B, C, D ------------------------------------------------------------------------
 LEVEL = DUE + DUE_SOURCES  # electrical level of the pins now
@@ -159,7 +172,12 @@ TIMER0 = constant(PIPE + 2 * PIPE_SLOTS)
 TIMER1 = constant(TIMER0 + _F_END)
 TIMER2 = constant(TIMER1 + _F_END)
 
-TOUCHED = int(TIMER2) + _F_END
+PAGE_BUFFER = int(TIMER2) + _F_END
+"""One word per word of the flash's temporary page buffer; EMPTY until it is filled."""
+PAGE_WORDS = 64
+EMPTY = -1
+
+TOUCHED = PAGE_BUFFER + PAGE_WORDS
 """256 words, one per data address: 1 + PC of the first access when its part is not modelled, else 0."""
 STATE_WORDS = TOUCHED + 256
 """What a snapshot has to copy of the state array; the queues are behind it."""

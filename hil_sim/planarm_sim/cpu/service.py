@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from planarm_sim.cpu.compiled import kernel  # kernel_cache: see there
-from planarm_sim.cpu.events import process_events
+from planarm_sim.cpu.events import next_event, process_events
 from planarm_sim.cpu.flags import I
 from planarm_sim.cpu.interrupts import lowest_bit, pending_interrupts
 from planarm_sim.cpu.layout import (
@@ -60,3 +60,19 @@ def service(st: State, eeprom: Bytes, target: int) -> int:
         if not enabled and due == NEVER:
             return ASLEEP_FOR_EVER
         st[CYCLE] = horizon
+
+
+@kernel
+def stand_still(st: State, eeprom: Bytes, until: int) -> int:
+    """Let time pass up to the cycle `until` while the CPU is halted; REACHED, or what must be seen to before."""
+    while True:
+        due = next_event(st)
+        if due > until:
+            st[CYCLE] = until
+            return REACHED
+        st[CYCLE] = max(st[CYCLE], due)
+        process_events(st, eeprom, due)
+        if st[RESET_REQUEST]:
+            return RESET_WANTED
+        if st[EDGE_COUNT] >= st[EDGE_LIMIT] or st[TX_COUNT] >= st[TX_LIMIT]:
+            return LOG_FULL

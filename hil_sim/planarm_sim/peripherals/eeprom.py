@@ -16,10 +16,12 @@ from planarm_sim.cpu.layout import (
     EE_WRITE_UNTIL,
     HORIZON,
     NEVER,
+    SPM_BUSY,
     Bytes,
     State,
 )
 from planarm_sim.cpu.registers import EEARH, EEARL, EECR, EEDR
+from planarm_sim.peripherals.self_programming import erase_buffer
 
 EEPM, EERIE, EEMPE, EEPE, EERE = 3 << 4, 1 << 3, 1 << 2, 1 << 1, 1 << 0
 ERASE_AND_WRITE, ERASE, WRITE = 0, 1, 2
@@ -42,8 +44,9 @@ def write_control(st: State, eeprom: Bytes, value: int, cycle: int) -> None:
     address = (st[EEARL] | (st[EEARH] << 8)) % EEPROM_BYTES
     mode = st[EECR] & EEPM if busy else value & EEPM
     st[EECR] = mode | (value & EERIE) | busy
-    if not busy and value & EEPE and cycle <= st[EE_WRITE_UNTIL]:
+    if not busy and value & EEPE and cycle <= st[EE_WRITE_UNTIL] and not st[SPM_BUSY]:
         st[EE_WRITE_UNTIL] = 0
+        erase_buffer(st)  # a page load is lost (27.8.2)
         st[EE_BUSY_ADDRESS] = address
         st[EE_BUSY_DATA] = st[EEDR]
         st[EE_BUSY_MODE] = mode >> 4
