@@ -22,7 +22,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
         description="Run an ATmega328P program on an emulated Arduino Uno behind a pseudo-terminal. The terminal's "
         "path is printed first. Ctrl-C ends the emulation.",
     )
-    parser.add_argument("image", metavar="IMAGE", help="program: Intel HEX or ELF")
+    parser.add_argument(
+        "image", metavar="IMAGE", nargs="?", help="program: Intel HEX or ELF; may be left out with --bootloader"
+    )
+    parser.add_argument("--bootloader", metavar="FILE", help="boot loader to start at resets; it takes uploads")
     parser.add_argument("--link", metavar="PATH", help="make PATH a link to the terminal")
     parser.add_argument("--vcd", metavar="FILE", help="write the pins' waveforms")
     parser.add_argument("--speed", choices=("real", "max"), default="real", help="default: %(default)s")
@@ -33,6 +36,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         result = emulate(
             options.image,
+            bootloader=options.bootloader,
             link=options.link,
             vcd=options.vcd,
             speed=options.speed,

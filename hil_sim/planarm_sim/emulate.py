@@ -15,6 +15,7 @@ import numpy as np
 from planarm_sim.board import PINS, Uno, pin_name
 from planarm_sim.bridge import BOOT_S, Bridge, BridgeCounts, Clock, Line, Speed, WallClock
 from planarm_sim.errors import BridgeError, StoppedError
+from planarm_sim.loader import Image, load_image
 from planarm_sim.trace import VcdWriter
 from planarm_wire import messages
 
@@ -53,8 +54,9 @@ class Emulation:
 
 
 def emulate(
-    image_path: str | Path,
+    image_path: str | Path | None,
     *,
+    bootloader: str | Path | None = None,
     link: str | Path | None = None,
     vcd: str | Path | None = None,
     speed: Speed = "real",
@@ -67,7 +69,8 @@ def emulate(
     """Emulate an Uno behind a pseudo-terminal until SIGINT or SIGTERM, or for a time.
 
     Args:
-        image_path: program, Intel HEX or ELF.
+        image_path: program, Intel HEX or ELF; None with a boot loader alone.
+        bootloader: boot loader, Intel HEX or ELF, that runs after every reset; programs can be uploaded to it.
         link: path at which the terminal can be opened, too.
         vcd: waveform file to write, all pins but the serial line's.
         speed: "real" or "max"; see `planarm_sim.bridge.bridge`.
@@ -79,6 +82,7 @@ def emulate(
 
     Raises:
         ImageError: the program cannot be loaded.
+        UsageError: neither program nor boot loader.
         BridgeError: no terminal, or no link to it, can be had.
         TraceError: the waveform file cannot be written.
     """
@@ -88,7 +92,7 @@ def emulate(
         raise BridgeError(
             "this system has no pseudo-terminals; use planarm --port sim://, which needs none, or Linux or macOS"
         ) from error
-    uno = Uno.from_file(image_path, baud=baud)
+    uno = Uno(_load(image_path), baud=baud, bootloader=_load(bootloader))
     uno.run(cycles=1)  # compiles the chip, or loads it from the cache: a host that opens the terminal need not wait
     with _stopped_by_signals() as stop, PtyLine(link) as line:
         announce(line.path)
@@ -103,6 +107,10 @@ def emulate(
             reset_on_open=reset_on_open,
             say=say,
         )
+
+
+def _load(path: str | Path | None) -> Image | None:
+    return None if path is None else load_image(path)
 
 
 def run_board(

@@ -18,7 +18,7 @@ from planarm_sim.board.pins import PINS, PinPlace, pin_place
 from planarm_sim.board.serial import CLOCK_HZ, FRAME_BITS, SerialPort, SerialState
 from planarm_sim.cpu.chip import EDGE_DTYPE, Chip, ResetCause, Snapshot, StopCause
 from planarm_sim.errors import LimitError, PinError, StoppedError, UsageError
-from planarm_sim.loader import Image, load_elf, load_hex, load_image
+from planarm_sim.loader import Image, join_bootloader, load_elf, load_hex, load_image
 from planarm_sim.trace import EDGE, VcdWriter
 from planarm_wire import messages
 
@@ -78,45 +78,63 @@ class Uno:
     Args:
         image: the program.
         baud: the host's rate on the serial line; see `serial`.
+        bootloader: what is in the boot section, and where resets lead then (fuses as its size asks; BOOTRST). It may
+            stand alone: None as `image` is a board to which nothing was uploaded yet.
 
     Attributes:
         serial: the host's end of the serial line.
     """
 
-    def __init__(self, image: Image, *, baud: int = DEFAULT_BAUD) -> None:
+    def __init__(self, image: Image | None, *, baud: int = DEFAULT_BAUD, bootloader: Image | None = None) -> None:
+        if bootloader is not None:
+            boot = join_bootloader(image, bootloader)
+            image = boot.image
+            self._chip = Chip(image.flash, boot_words=boot.section_bytes // 2, boot_reset=True)
+        elif image is not None:
+            self._chip = Chip(image.flash)
+        else:
+            raise UsageError("a board with neither program nor boot loader does nothing; give one of them")
         self._source = image.source
-        self._chip = Chip(image.flash)
         self.serial = SerialPort(self._chip, baud)
         self._edges: list[NDArray[Any]] = []
         self._log_start_cycle = 0
         self._log_start_levels = self._levels()
 
     @classmethod
-    def from_hex(cls, path: str | Path, *, baud: int = DEFAULT_BAUD) -> Self:
-        """Power up with the program of an Intel HEX file.
+    def from_hex(cls, path: str | Path, *, baud: int = DEFAULT_BAUD, bootloader: str | Path | None = None) -> Self:
+        """Power up with the program of an Intel HEX file, and a boot loader (either kind of file) if one is given.
 
         Raises:
             ImageError: the file cannot be loaded.
         """
-        return cls(load_hex(path), baud=baud)
+        return cls(load_hex(path), baud=baud, bootloader=_load_optional(bootloader))
 
     @classmethod
-    def from_elf(cls, path: str | Path, *, baud: int = DEFAULT_BAUD) -> Self:
+    def from_elf(cls, path: str | Path, *, baud: int = DEFAULT_BAUD, bootloader: str | Path | None = None) -> Self:
         """Power up with the program of an ELF executable, as avr-gcc links it.
 
         Raises:
             ImageError: the file cannot be loaded.
         """
-        return cls(load_elf(path), baud=baud)
+        return cls(load_elf(path), baud=baud, bootloader=_load_optional(bootloader))
 
     @classmethod
-    def from_file(cls, path: str | Path, *, baud: int = DEFAULT_BAUD) -> Self:
+    def from_file(cls, path: str | Path, *, baud: int = DEFAULT_BAUD, bootloader: str | Path | None = None) -> Self:
         """Power up with the program of a file of either kind.
 
         Raises:
             ImageError: the file cannot be loaded.
         """
-        return cls(load_image(path), baud=baud)
+        return cls(load_image(path), baud=baud, bootloader=_load_optional(bootloader))
+
+    @classmethod
+    def from_bootloader(cls, path: str | Path, *, baud: int = DEFAULT_BAUD) -> Self:
+        """Power up with a boot loader in an otherwise empty flash.
+
+        Raises:
+            ImageError: the file cannot be loaded, or no boot section holds it.
+        """
+        return cls(None, baud=baud, bootloader=load_image(path))
 
     @property
     def cycle(self) -> int:
@@ -127,6 +145,11 @@ class Uno:
     def time_s(self) -> float:
         """Seconds since power-up."""
         return self._chip.cycle / CLOCK_HZ
+
+    @property
+    def flash(self) -> bytes:
+        """The whole program memory as it is now."""
+        return self._chip.flash.tobytes()
 
     @property
     def warnings(self) -> tuple[str, ...]:
@@ -179,7 +202,10 @@ class Uno:
             self._run_to(min(self._chip.cycle + step, end))
 
     def reset(self) -> None:
-        """Press the reset button: an external reset, now. SRAM and the bytes on the serial line stay."""
+        """Press the reset button: an external reset, now. SRAM and the bytes on the serial line stay.
+
+        It is what a host does to a real Uno by DTR when it opens the port; a boot loader starts.
+        """
         self._chip.reset(ResetCause.EXTERNAL)
         self._collect()
 
@@ -278,3 +304,7 @@ class Uno:
 
     def _levels(self) -> tuple[int, ...]:
         return tuple(self._chip.pin_level(index) for index in _PIN_INDICES)
+
+
+def _load_optional(path: str | Path | None) -> Image | None:
+    return None if path is None else load_image(path)
