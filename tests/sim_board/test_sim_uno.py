@@ -326,3 +326,19 @@ def test_an_elf_file_runs_as_its_hex_file(tmp_path):
         uno.run(cycles=8000)
     np.testing.assert_array_equal(boards[0].edges("D9"), boards[1].edges("D9"))
     assert len(boards[0].edges("D9")) >= 9
+
+
+def test_analogue_inputs_have_the_boards_names():
+    uno = Uno.from_hex(DATA / "pulses.hex")
+    assert uno.analog("A0").volts is None
+    uno.analog("A0").volts = 2.5
+    uno.analog("AREF").volts = 3.3
+    assert (uno.analog("A0").volts, uno.analog("A1").volts, uno.analog("AREF").volts) == (2.5, None, 3.3)
+    uno.reset()
+    assert uno.analog("A0").volts == 2.5
+    uno.analog("A0").volts = None
+    assert uno.analog("A0").volts is None
+    with pytest.raises(PinError, match="D3 has no analogue input"):
+        uno.analog("D3")
+    with pytest.raises(PinError, match="0 to 5 V"):
+        uno.analog("A5").volts = -0.1

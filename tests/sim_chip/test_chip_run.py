@@ -219,16 +219,16 @@ def test_the_kernel_runs_the_same_without_its_compiler():
 
 
 def test_what_is_not_modelled_is_noted_once_with_its_place():
-    # ADCSRA is written at word 3 and again later, SPDR read at word 6, beyond the SRAM at word 8.
+    # TWBR is written at word 3 and again later, SPDR read at word 6, beyond the SRAM at word 8.
     source = (
-        "nop\nnop\nldi r16, 0x80\nsts 0x7A, r16\nnop\nin r1, 0x2E\nsts 0x7A, r16\nlds r2, 0x0A00\nlds r3, 0x7A\nbreak"
+        "nop\nnop\nldi r16, 0x80\nsts 0xB8, r16\nnop\nin r1, 0x2E\nsts 0xB8, r16\nlds r2, 0x0A00\nlds r3, 0xB8\nbreak"
     )
     chip = Chip(assemble(source))
     assert chip.unmodelled() == ()
     assert chip.run_to(100) is StopCause.BREAK
     assert chip.unmodelled() == (
         FirstTouch(0x4E, "SPDR", 6),
-        FirstTouch(0x7A, "ADCSRA", 3),
+        FirstTouch(0xB8, "TWBR", 3),
         FirstTouch(0x0A00, "0x0A00", 9),
     )
     assert chip.registers[3] == 0x80

@@ -19,10 +19,11 @@ from planarm_sim.board.serial import CLOCK_HZ, FRAME_BITS, SerialPort, SerialSta
 from planarm_sim.cpu.chip import EDGE_DTYPE, Chip, ResetCause, Snapshot, StopCause
 from planarm_sim.errors import LimitError, PinError, StoppedError, UsageError
 from planarm_sim.loader import Image, join_bootloader, load_elf, load_hex, load_image
+from planarm_sim.peripherals.adc import AREF
 from planarm_sim.trace import EDGE, VcdWriter
 from planarm_wire import messages
 
-__all__ = ["CLOCK_HZ", "Pin", "Uno", "UnoSnapshot"]
+__all__ = ["CLOCK_HZ", "AnalogInput", "Pin", "Uno", "UnoSnapshot"]
 
 DEFAULT_BAUD = messages.BAUD
 _NO_EDGES = np.empty(0, EDGE_DTYPE)
@@ -70,6 +71,27 @@ class Pin:
     def release(self) -> None:
         """Let go of the pin."""
         self._chip.drive_pin(self._place.index, None)
+
+
+class AnalogInput:
+    """An input of the analogue-to-digital converter, made by `Uno.analog`."""
+
+    def __init__(self, chip: Chip, channel: int) -> None:
+        self._chip = chip
+        self._channel = channel
+
+    @property
+    def volts(self) -> float | None:
+        """The voltage from outside, 0 to 5 V; None: nothing is connected, conversions see the digital level.
+
+        Raises:
+            PinError: set outside the limits.
+        """
+        return self._chip.analog_volts(self._channel)
+
+    @volts.setter
+    def volts(self, value: float | None) -> None:
+        self._chip.drive_analog(self._channel, value)
 
 
 class Uno:
@@ -216,6 +238,19 @@ class Uno:
             PinError: the board has no such pin; the message names the closest.
         """
         return Pin(self._chip, pin_place(name))
+
+    def analog(self, name: str) -> AnalogInput:
+        """An analogue input by its name on the board: "A0" to "A5", or the reference "AREF".
+
+        Raises:
+            PinError: the board has no such input.
+        """
+        if name == "AREF":
+            return AnalogInput(self._chip, AREF)
+        place = pin_place(name)
+        if place.port != "C":
+            raise PinError(f"pin {name} has no analogue input; A0 to A5 and AREF have")
+        return AnalogInput(self._chip, place.bit)
 
     def edges(self, name: str) -> NDArray[Any]:
         """Level changes that the program made on a pin since power-up, or since `clear_edges`.

@@ -27,6 +27,9 @@ from planarm_sim.cpu.layout import (
     State,
 )
 from planarm_sim.cpu.registers import (
+    ADCL,
+    ADCSRB,
+    ADMUX,
     EEARH,
     EEARL,
     EECR,
@@ -76,6 +79,7 @@ from planarm_sim.cpu.registers import (
     UDR0,
     WDTCSR,
 )
+from planarm_sim.peripherals.adc import ACME, ADTS, read_adc, write_adc
 from planarm_sim.peripherals.eeprom import read_control, write_control
 from planarm_sim.peripherals.ports import PUD, read_pins, refresh_port, write_port
 from planarm_sim.peripherals.self_programming import BLBSET, SIGRD, write_spm_control
@@ -163,6 +167,8 @@ def read_io(st: State, eeprom: Bytes, address: int) -> int:  # noqa: PLR0911 - o
         return read_data(st)
     if address in (UCSR0A, UCSR0B, PCIFR, EIFR, WDTCSR, SPMCSR):
         return int(st[address])
+    if ADCL <= address <= ADMUX:
+        return read_adc(st, address)
     if address == EECR:
         return read_control(st, cycle)
     touch(st, address)
@@ -225,12 +231,23 @@ def write_rare_io(st: State, eeprom: Bytes, address: int, value: int, cycle: int
         write_watchdog(st, value, cycle)
     elif address == GTCCR:
         write_prescaler_control(st, value, cycle)
-    elif address == MCUCR:
+    else:
+        write_rarest_io(st, address, value, cycle)
+
+
+@kernel
+def write_rarest_io(st: State, address: int, value: int, cycle: int) -> None:
+    """Write one of the others, or a register of a part that is not modelled."""
+    if address == MCUCR:
         write_mcu_control(st, value, cycle)
     elif address == SPMCSR:
         write_spm_control(st, value, cycle)
         if value & (SIGRD | BLBSET):
             touch(st, address)  # signature, fuses and lock bits are not modelled
+    elif ADCL <= address <= ADMUX:
+        write_adc(st, address, value, cycle)
+        if address == ADCSRB and value & (ACME | ADTS):
+            touch(st, address)  # of the triggers only free running is modelled
     else:
         touch(st, address)
         st[address] = value

@@ -22,6 +22,7 @@ from planarm_sim.cpu.dispatch import run
 from planarm_sim.cpu.program import Program
 from planarm_sim.cpu.service import stand_still
 from planarm_sim.errors import ImageError, PinError, UsageError
+from planarm_sim.peripherals.adc import NOT_DRIVEN, SUPPLY_UV
 from planarm_sim.peripherals.eeprom import EEPROM_BYTES
 from planarm_sim.peripherals.ports import drive_from_outside, refresh_port
 from planarm_sim.peripherals.self_programming import RWWSB, erase_buffer, execute_spm
@@ -128,6 +129,7 @@ class Chip:
         state = np.zeros(at.QUEUES, dtype=np.int64)
         state[at.BOOT_START] = _FLASH_WORDS - boot_words
         state[at.BOOT_RESET] = boot_reset
+        state[at.ADC_INPUT : at.ADC_INPUT + at.ADC_INPUTS] = NOT_DRIVEN
         nothing = np.empty(0, dtype=np.int64)
         self._state = queues.allocate(state, (nothing,) * len(queues.ALL))
         self.reset(ResetCause.POWER_ON)
@@ -182,7 +184,7 @@ class Chip:
         st[at.CONSTANTS :] = old[at.CONSTANTS :]
         kept = [at.CYCLE, at.TX_BASE, at.TX_COUNT, at.TX_LIMIT, at.EDGE_BASE, at.EDGE_COUNT, at.EDGE_LIMIT]
         kept += [at.RX_BASE, at.RX_HEAD, at.RX_TAIL, at.IN_BASE, at.IN_HEAD, at.IN_TAIL, at.BOOT_START]
-        kept += [at.BOOT_RESET]
+        kept += [at.BOOT_RESET, *range(at.ADC_INPUT, at.ADC_INPUT + at.ADC_INPUTS)]
         kept += [at.OUTSIDE_ADDRESS, at.OUTSIDE_PC, *range(at.LEVEL, at.PIPE), *range(at.TOUCHED, at.TOUCHED + 256)]
         st[kept] = old[kept]
         st[at.OVERRIDE : at.EXTERNAL] = 0
@@ -310,6 +312,23 @@ class Chip:
         """Return the electrical level of a pin now, 0 or 1; a floating pin reads 0."""
         self._check_pin(pin)
         return int(self._state[at.LEVEL + (pin >> 3)] >> (pin & 7)) & 1
+
+    def drive_analog(self, channel: int, volts: float | None) -> None:
+        """Put a voltage on an ADC channel, 0 to 7, or on AREF (8), from now on; None lets go of it.
+
+        Raises:
+            PinError: no such channel, or volts outside the supply's 0 to 5.
+        """
+        if not 0 <= channel < at.ADC_INPUTS:
+            raise PinError(f"ADC channel {channel}: the ATmega328P has 0 to 7, and AREF is 8")
+        if volts is not None and not 0 <= volts <= SUPPLY_UV / 1e6:
+            raise PinError(f"{volts} V on ADC channel {channel}: inputs take 0 to {SUPPLY_UV / 1e6:g} V")
+        self._state[at.ADC_INPUT + channel] = NOT_DRIVEN if volts is None else round(volts * 1e6)
+
+    def analog_volts(self, channel: int) -> float | None:
+        """Return the voltage that `drive_analog` put there, None without one."""
+        microvolts = int(self._state[at.ADC_INPUT + channel])
+        return None if microvolts == NOT_DRIVEN else microvolts / 1e6
 
     # --- Whole state -------------------------------------------------------------------------------------------
 

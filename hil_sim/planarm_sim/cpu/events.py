@@ -5,6 +5,7 @@ from __future__ import annotations
 from planarm_sim.cpu.compiled import kernel  # kernel_cache: see there
 from planarm_sim.cpu.layout import (
     DUE,
+    DUE_ADC,
     DUE_CAPTURE,
     DUE_EEPROM,
     DUE_INPUT,
@@ -27,6 +28,7 @@ from planarm_sim.cpu.layout import (
     Bytes,
     State,
 )
+from planarm_sim.peripherals.adc import advance_adc
 from planarm_sim.peripherals.eeprom import finish_write
 from planarm_sim.peripherals.external import capture, deliver_inputs
 from planarm_sim.peripherals.ports import drive_from_outside
@@ -82,6 +84,8 @@ def happen(st: State, eeprom: Bytes, source: int, cycle: int) -> None:
         watchdog_timeout(st, cycle)
     elif source == DUE_SPM:
         end_command(st)
+    elif source == DUE_ADC:
+        advance_adc(st, cycle)
 
 
 @kernel

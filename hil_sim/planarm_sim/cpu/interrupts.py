@@ -5,6 +5,7 @@ from __future__ import annotations
 from planarm_sim.cpu.compiled import kernel  # kernel_cache: see there
 from planarm_sim.cpu.layout import LEVEL, State
 from planarm_sim.cpu.registers import (
+    ADCSRA,
     EECR,
     EICRA,
     EIFR,
@@ -22,6 +23,7 @@ from planarm_sim.cpu.registers import (
     UCSR0B,
     WDTCSR,
 )
+from planarm_sim.peripherals.adc import ADIE, ADIF
 from planarm_sim.peripherals.eeprom import EEPE, EERIE
 from planarm_sim.peripherals.ports import PORT_D
 from planarm_sim.peripherals.self_programming import SELFPRGEN, SPMIE
@@ -36,6 +38,7 @@ TIMER2_COMPA, TIMER2_COMPB, TIMER2_OVF = 7, 8, 9
 TIMER1_CAPT, TIMER1_COMPA, TIMER1_COMPB, TIMER1_OVF = 10, 11, 12, 13
 TIMER0_COMPA, TIMER0_COMPB, TIMER0_OVF = 14, 15, 16
 USART_RX, USART_UDRE, USART_TX = 18, 19, 20
+ADC_COMPLETE = 21
 EE_READY = 22
 SPM_READY = 25
 ENTRY_CYCLES, WAKE_CYCLES = 4, 4
@@ -63,6 +66,8 @@ def pending_interrupts(st: State) -> int:
         pending |= ((usart & RXC) >> 7) << USART_RX
         pending |= ((usart & UDRE) >> 5) << USART_UDRE
         pending |= ((usart & TXC) >> 6) << USART_TX
+    if st[ADCSRA] & ADIF and st[ADCSRA] & ADIE:
+        pending |= 1 << ADC_COMPLETE
     if st[EECR] & EERIE and st[EECR] & EEPE == 0:
         pending |= 1 << EE_READY
     if st[SPMCSR] & (SPMIE | SELFPRGEN) == SPMIE:
@@ -112,7 +117,9 @@ def acknowledge(st: State, vector: int) -> bool:
         st[TIFR0] &= ~timer_flag(vector - TIMER0_COMPA)
     elif vector == USART_TX:
         st[UCSR0A] &= ~TXC
-    return INT1 < vector <= TIMER0_OVF or vector == USART_TX
+    elif vector == ADC_COMPLETE:
+        st[ADCSRA] &= ~ADIF
+    return INT1 < vector <= TIMER0_OVF or vector in (USART_TX, ADC_COMPLETE)
 
 
 @kernel

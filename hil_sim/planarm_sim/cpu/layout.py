@@ -57,6 +57,15 @@ UNKNOWN = -1
     EE_BUSY_MODE,
     SPM_BUSY,  # 1 while a page of the flash is erased or written
     SPM_HALT_UNTIL,  # the CPU stands still until then: the page is in the section that it runs from
+    # --- ADC ---
+    ADC_ORIGIN,  # cycle at which its prescaler began to count
+    ADC_PHASE,
+    ADC_FIRST,  # 1 until the first conversion since ADEN was set
+    ADC_START,
+    ADC_MUX,  # ADMUX as it was then
+    ADC_SAMPLE,
+    ADC_RESULT,
+    ADC_LOCKED,  # 1 between reads of ADCL and ADCH
     # --- Shared prescalers of the timers ---
     PRESCALER_01,  # cycle of the last reset of the prescaler of timers 0 and 1
     PRESCALER_2,
@@ -96,7 +105,7 @@ UNKNOWN = -1
     IN_HEAD,
     IN_TAIL,
     _CPU_END,
-) = range(256, 256 + 61)
+) = range(256, 256 + 69)
 
 # --- When each source of events is due ----------------------------------------------------------------------
 (
@@ -111,8 +120,9 @@ UNKNOWN = -1
     DUE_EEPROM,
     DUE_WATCHDOG,
     DUE_SPM,
-) = range(_CPU_END, _CPU_END + 11)
-DUE, DUE_SOURCES = DUE_TIMER0, 11
+    DUE_ADC,
+) = range(_CPU_END, _CPU_END + 12)
+DUE, DUE_SOURCES = DUE_TIMER0, 12
 
 # --- Ports, one word each for B, C, D ------------------------------------------------------------------------
 LEVEL = DUE + DUE_SOURCES  # electrical level of the pins now
@@ -177,7 +187,11 @@ PAGE_BUFFER = int(TIMER2) + _F_END
 PAGE_WORDS = 64
 EMPTY = -1
 
-TOUCHED = PAGE_BUFFER + PAGE_WORDS
+ADC_INPUT = PAGE_BUFFER + PAGE_WORDS
+"""Microvolts on the ADC's eight channels and on AREF, or -1 where nothing outside drives them."""
+ADC_INPUTS = 9
+
+TOUCHED = ADC_INPUT + ADC_INPUTS
 """256 words, one per data address: 1 + PC of the first access when its part is not modelled, else 0."""
 STATE_WORDS = TOUCHED + 256
 """What a snapshot has to copy of the state array; the queues are behind it."""
