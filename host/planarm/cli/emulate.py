@@ -23,6 +23,7 @@ def execute(options: argparse.Namespace) -> int:
     try:
         result = emulate(
             options.firmware or released_image(),
+            bootloader=options.bootloader,
             link=options.link,
             vcd=options.vcd,
             speed=options.speed,

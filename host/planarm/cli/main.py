@@ -135,6 +135,7 @@ def _add_stream(commands: Commands) -> None:
 def _add_emulate(commands: Commands) -> None:
     command = commands.add_parser("emulate", help="run a flash image on the emulated Uno behind a virtual serial port")
     command.add_argument("--firmware", metavar="HEX|ELF", help="the image to run (default: the released firmware)")
+    command.add_argument("--bootloader", metavar="HEX|ELF", help="a boot loader, so that avrdude can upload")
     command.add_argument("--link", metavar="PATH", help="make PATH a link to the pty")
     command.add_argument("--vcd", metavar="FILE", help="write the pins' edges to FILE at the end")
     command.add_argument("--speed", choices=("real", "max"), default="real", help="pace of the chip's clock")
