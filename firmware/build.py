@@ -87,8 +87,25 @@ def read_settings(environment: str) -> tuple[list[str], list[Path]]:
     return " ".join(flags.splitlines()).replace("-I ", "-I").split(), sources
 
 
+def require_free_registers(elf: Path, flags: list[str]) -> None:
+    """Raise BuildError if any code but the interrupts uses a register that `flags` keep for them (-ffixed-rN).
+
+    The flags bind our own compiler only; the libraries of the compiler are linked as they are.
+    """
+    numbers = [flag.removeprefix("-ffixed-r") for flag in flags if flag.startswith("-ffixed-r")]
+    kept = re.compile(rf"\br(?:{'|'.join(numbers)})\b")
+    for function in run(["avr-objdump", "-d", "--no-show-raw-insn", str(elf)]).split("\n\n"):
+        if "<__vector_" in function.split("\n", 1)[0]:
+            continue
+        for line in function.splitlines()[1:]:
+            address, _, instruction = line.partition(":\t")
+            if kept.search(instruction.split(";", 1)[0]):
+                name = function.split("\n", 1)[0]
+                raise BuildError(f"{elf}: {name} {address.strip()}: {instruction!r} uses a register of the interrupts")
+
+
 def build_avr(out: Path) -> Path:
-    """Build uno.elf and uno.hex in `out` by avr-gcc; return the hex."""
+    """Build uno.elf and uno.hex in `out` by avr-gcc; return the hex. Reserved registers are checked."""
     flags, sources = read_settings("uno")
     compile_flags = [flag for flag in flags if not flag.startswith("-Wl,")]
     link_flags = [flag for flag in flags if flag.startswith("-Wl,")]
@@ -100,6 +117,7 @@ def build_avr(out: Path) -> Path:
         objects.append(str(target))
     elf, image = out / "uno.elf", out / "uno.hex"
     run(["avr-g++", *PLATFORM_LINK, *link_flags, "-o", str(elf), *objects])
+    require_free_registers(elf, flags)
     run(["avr-objcopy", "-O", "ihex", "-R", ".eeprom", str(elf), str(image)])
     return image
 

@@ -52,7 +52,7 @@ class Delays:
     entry_ticks: int = 60
     late_entry_ticks: int = 0
     late_every: int = 0
-    leave_ticks: int = 120
+    leave_ticks: int = 45
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ namespace wire {
 // Both ends must have the same.
 constexpr uint8_t PROTOCOL_VERSION = 1;
 // Of the specification without its wording.
-constexpr uint32_t SPEC_HASH = 0x31D9C878UL;
+constexpr uint32_t SPEC_HASH = 0xD92A41ECUL;
 
 // Ends every frame.
 constexpr uint8_t DELIMITER = 0x7E;
@@ -44,8 +44,8 @@ constexpr uint8_t RX_RING_BYTES = 128;
 constexpr uint8_t HOST_WINDOW_BYTES = 112;
 // Segments the firmware holds.
 constexpr uint8_t QUEUE_SLOTS = 32;
-// Least time between two steps of one joint, both inside a segment and across a boundary.
-constexpr uint16_t MIN_INTERVAL_TICKS = 800U;
+// Least time between two steps of one joint; min_dir_setup_ticks more where it turns round.
+constexpr uint16_t MIN_INTERVAL_TICKS = 320U;
 // Largest interval inside a run of more than one step; longer gaps need a segment of their own.
 constexpr uint16_t MAX_INTERVAL_TICKS = 60000U;
 // Longest segment, about 67 s.

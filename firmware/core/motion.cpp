@@ -12,9 +12,9 @@ namespace {
 // near enough for its time to compare rightly.
 constexpr int32_t PREPARE_AHEAD_TICKS = 0x100000;
 
-// The first segment to be prepared must have come this long before its start: 0.5 ms, in which a pass of the
-// main program ends at the latest and the joint gets its DIR.
-constexpr int32_t LATEST_ARRIVAL_TICKS = 8000;
+// The first segment to be prepared must have come this long before its start: 1.25 ms, in which a pass of the
+// main program ends at the latest, with both joints at the least interval, and the joint gets its DIR.
+constexpr int32_t LATEST_ARRIVAL_TICKS = 20000;
 
 static_assert((wire::QUEUE_SLOTS & (wire::QUEUE_SLOTS - 1)) == 0, "slot indices wrap by a mask");
 

@@ -51,7 +51,7 @@ void read_move(Reader& reader, Move& move) {
 }
 
 // Checks one joint's move and carries its rest on to the segment's end.
-bool check_move(Move& move, uint32_t duration_ticks, uint32_t& rest_ticks) {
+bool check_move(Move& move, uint32_t duration_ticks, uint32_t& rest_ticks, bool& rest_positive) {
     if (move.steps == 0) {
         const uint32_t rested = rest_ticks + duration_ticks;
         rest_ticks = rested < rest_ticks ? Rest::FOREVER : rested;
@@ -65,9 +65,12 @@ bool check_move(Move& move, uint32_t duration_ticks, uint32_t& rest_ticks) {
 
     const uint32_t gap_ticks = rest_ticks + move.first_ticks;
     const bool far = gap_ticks < rest_ticks || gap_ticks > MAX_AHEAD_TICKS;
-    if (!far && gap_ticks < wire::MIN_INTERVAL_TICKS) return false;
+    const uint16_t least_ticks =
+        move.positive == rest_positive ? wire::MIN_INTERVAL_TICKS : MIN_REVERSAL_TICKS;
+    if (!far && gap_ticks < least_ticks) return false;
     move.near = !far;
     rest_ticks = duration_ticks - last_ticks;
+    rest_positive = move.positive;
     return true;
 }
 
@@ -101,7 +104,7 @@ wire::Result check_segment(Segment& segment, Rest& rest) {
     const uint32_t duration_ticks = segment.duration_ticks;
     if (duration_ticks == 0 || duration_ticks > wire::MAX_SEGMENT_TICKS) return wire::Result::OUT_OF_RANGE;
     for (uint8_t joint = 0; joint < wire::JOINTS; ++joint) {
-        if (!check_move(segment.moves[joint], duration_ticks, rest.ticks[joint])) {
+        if (!check_move(segment.moves[joint], duration_ticks, rest.ticks[joint], rest.positive[joint])) {
             return wire::Result::OUT_OF_RANGE;
         }
     }

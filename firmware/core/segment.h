@@ -30,7 +30,11 @@ struct Segment {
 struct Rest {
     static constexpr uint32_t FOREVER = 0xFFFFFFFF;
     uint32_t ticks[wire::JOINTS] = {FOREVER, FOREVER};
+    bool positive[wire::JOINTS] = {};  // the direction of that step
 };
+
+// Least time between two steps of a joint in opposite directions.
+constexpr uint16_t MIN_REVERSAL_TICKS = wire::MIN_INTERVAL_TICKS + wire::MIN_DIR_SETUP_TICKS;
 
 // Longest wait for which a compare register may be set ahead: the 16-bit timer must still tell early from
 // late.

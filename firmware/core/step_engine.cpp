@@ -19,6 +19,7 @@ struct Ring {
     Run* oldest;              // not yet taken back
     Run* free;                // the next to be filled
     int32_t position_usteps;  // of all runs taken back
+    bool positive;            // direction of the run appended last
 };
 
 Ring rings[wire::JOINTS];
@@ -30,7 +31,7 @@ int32_t signed_steps(const Run& run, uint16_t steps) {
 void clear(uint8_t joint) {
     Ring& ring = rings[joint];
     for (uint8_t i = 0; i < RING_RUNS; ++i) {
-        ring.runs[i].chained = false;
+        ring.runs[i].chained = Chain::NONE;
         ring.runs[i].next = &ring.runs[(i + 1) % RING_RUNS];
     }
     ring.oldest = ring.free = ring.runs;
@@ -46,7 +47,7 @@ void take_back(uint8_t joint) {
     Ring& ring = rings[joint];
     const Run* const active = active_run(joint);
     while (ring.oldest != active) {
-        ring.oldest->chained = false;
+        ring.oldest->chained = Chain::NONE;
         ring.position_usteps += signed_steps(*ring.oldest, ring.oldest->steps);
         ring.oldest = ring.oldest->next;
     }
@@ -55,13 +56,14 @@ void take_back(uint8_t joint) {
 // Places the first edge of an idle joint's next run. False when it is too late for it.
 template <uint8_t JOINT>
 bool start(const Run& run) {
+    const uint16_t margin = hal::dir_is<JOINT>(run.positive) ? STEP_MARGIN_TICKS : DIR_MARGIN_TICKS;
     hal::dir_write<JOINT>(run.positive);
     const uint16_t edge = static_cast<uint16_t>(run.first_ticks);
     const hal::InterruptLock lock;
     hal::step_set_edge<JOINT>(edge);
     hal::step_forget_match<JOINT>();
     const uint16_t remaining = static_cast<uint16_t>(edge - hal::counter());
-    if (static_cast<uint16_t>(remaining - DIR_MARGIN_TICKS) > START_AHEAD_TICKS) return false;
+    if (static_cast<uint16_t>(remaining - margin) > START_AHEAD_TICKS) return false;
     hal::step_arm<JOINT>();
     hal::step_interrupt_on<JOINT>();
     return true;
@@ -129,8 +131,10 @@ void append(uint8_t joint, const Move& move, uint32_t start_ticks) {
     run.steps_left = run.steps = move.steps;
     run.first_ticks = start_ticks + move.first_ticks;
     run.positive = move.positive;
+    const Chain near = move.positive == ring.positive ? Chain::ONWARD : Chain::REVERSED;
+    ring.positive = move.positive;
     hal::compiler_barrier();
-    run.chained = move.near;
+    run.chained = move.near ? near : Chain::NONE;
     ring.free = run.next;
 }
 

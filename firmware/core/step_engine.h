@@ -13,6 +13,9 @@
 
 namespace planarm {
 
+// Whether the interrupt may go on to a run by itself, and whether DIR changes for it.
+enum class Chain : uint8_t { NONE = 0, ONWARD = 1, REVERSED = 2 };
+
 // Steps of one joint in one direction, as the step interrupt works them off.
 struct Run {
     uint32_t interval_q16;  // from the current step to the next
@@ -23,7 +26,7 @@ struct Run {
     Run* next;
     uint16_t steps;
     bool positive;
-    volatile bool chained;  // written last: the interrupt may go on to this run by itself
+    volatile Chain chained;  // written last
 };
 
 struct StepJoint {
@@ -38,7 +41,7 @@ namespace step_engine {
 // Distance that an edge must still have when it is placed: the low time, which also covers the way to the
 // arming write.
 constexpr uint16_t STEP_MARGIN_TICKS = wire::MIN_STEP_LOW_TICKS;
-// The same after a DIR write.
+// The same after a change of DIR.
 constexpr uint16_t DIR_MARGIN_TICKS = wire::MIN_DIR_SETUP_TICKS;
 
 struct Position {
@@ -68,7 +71,8 @@ void stop();
 // Signed steps since start-up at this instant, a pulse that is still high included.
 Position position();
 
-// Counts the step that has just risen and places the next one. Called by the compare interrupt only.
+// Counts the step that has just risen and places the next one: the step interrupt in plain C++. The native
+// board runs it; hal/uno/step_interrupts.cpp does the same, statement by statement, in assembler.
 template <uint8_t JOINT>
 HAL_INLINE void on_match() {
     Run* const run = step_joints[JOINT].active;
@@ -91,7 +95,8 @@ HAL_INLINE void on_match() {
     } else {
         Run* const next = run->next;
         step_joints[JOINT].active = next;
-        if (!next->chained) {
+        const Chain chained = next->chained;
+        if (chained == Chain::NONE) {
             hal::step_fall<JOINT>();
             hal::step_interrupt_off<JOINT>();
             return;
@@ -99,9 +104,11 @@ HAL_INLINE void on_match() {
         const uint16_t edge = static_cast<uint16_t>(next->first_ticks);
         hal::step_set_edge<JOINT>(edge);
         hal::step_fall<JOINT>();
-        hal::dir_write<JOINT>(next->positive);
+        const bool reversed = chained == Chain::REVERSED;
+        if (reversed) hal::dir_write<JOINT>(next->positive);
+        const uint16_t margin = reversed ? DIR_MARGIN_TICKS : STEP_MARGIN_TICKS;
         const uint16_t remaining = static_cast<uint16_t>(edge - hal::counter());
-        if (static_cast<uint16_t>(remaining - DIR_MARGIN_TICKS) <= MAX_AHEAD_TICKS) {
+        if (static_cast<uint16_t>(remaining - margin) <= MAX_AHEAD_TICKS) {
             hal::step_arm<JOINT>();
             return;
         }

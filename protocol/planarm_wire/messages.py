@@ -13,7 +13,7 @@ from planarm_wire.layout import END, Field
 
 PROTOCOL_VERSION: Final = 1
 """Both ends must have the same."""
-SPEC_HASH: Final = 0x31D9C878
+SPEC_HASH: Final = 0xD92A41EC
 """Hash of the specification without its wording."""
 DELIMITER: Final = 0x7E
 """Ends every frame."""
@@ -43,8 +43,8 @@ HOST_WINDOW_BYTES: Final = 112
 """Most unacknowledged bytes, as encoded, the host may have in flight."""
 QUEUE_SLOTS: Final = 32
 """Segments the firmware holds."""
-MIN_INTERVAL_TICKS: Final = 800
-"""Least time between two steps of one joint, both inside a segment and across a boundary."""
+MIN_INTERVAL_TICKS: Final = 320
+"""Least time between two steps of one joint; min_dir_setup_ticks more where it turns round."""
 MAX_INTERVAL_TICKS: Final = 60_000
 """Largest interval inside a run of more than one step; longer gaps need a segment of their own."""
 MAX_SEGMENT_TICKS: Final = 1_073_741_823

@@ -190,7 +190,7 @@ def test_segments_that_come_just_before_the_end_are_in_time(board: Board) -> Non
     motion = end_motion([segment_of(60_000, run_of(20))] * 2)
     board.ask(Segments(motion[:1]))
     board.send(Start(LEAD_TICKS))
-    board.run(LEAD_TICKS + 20_000)
+    board.run(LEAD_TICKS + 10_000)
     board.send(Segments(motion[1:]))
     board.run(160_000)
     assert board.ask().fault is Fault.NONE
@@ -239,7 +239,11 @@ def test_late_interrupts_never_give_a_wrong_step(
 ) -> None:
     # One interrupt in `late_every` starts late: every step comes on its tick, or the first that cannot stops both.
     motion = [
-        segment_of(30 * interval, run_of(29, interval=interval), run_of(29 * interval // other, interval=other))
+        segment_of(
+            30 * interval,
+            run_of(29, first=0, interval=interval),
+            run_of(29 * interval // other, first=0, interval=other),
+        )
     ] * 2
     delays = Delays(late_entry_ticks=60 + lateness, late_every=late_every)
     board = Board(native_firmware, delays=delays)

@@ -43,19 +43,19 @@ from planarm_wire.messages import (
 )
 from planarm_wire.steps import step_ticks
 
+MIN_REVERSAL_TICKS = MIN_INTERVAL_TICKS + MIN_DIR_SETUP_TICKS
 SHORTEST_SEGMENT_TICKS = 6000  # what the simulated main program, at 600 ticks a pass, prepares in time with ease
 
 
 @st.composite
-def moves(draw: st.DrawFn, rest_ticks: int) -> Move:
-    """A move that keeps all limits after a rest."""
+def moves(draw: st.DrawFn, rest_ticks: int, was_positive: bool) -> Move:
+    """A move that keeps all limits after a rest that followed a step in the direction told."""
     steps = draw(st.one_of(st.just(0), st.just(1), st.integers(2, 40)))
     if steps == 0:
         return REST
-    first = max(0, MIN_INTERVAL_TICKS - rest_ticks) + draw(
-        st.one_of(st.just(0), st.integers(0, 3000), st.integers(0, 200_000))
-    )
     positive = draw(st.booleans())
+    least = MIN_INTERVAL_TICKS if positive is was_positive else MIN_REVERSAL_TICKS
+    first = max(0, least - rest_ticks) + draw(st.one_of(st.just(0), st.integers(0, 3000), st.integers(0, 200_000)))
     if steps == 1:
         return Move(2 + positive, first)
     limits = (MIN_INTERVAL_TICKS << 16, MAX_INTERVAL_TICKS << 16)
@@ -70,12 +70,16 @@ def moves(draw: st.DrawFn, rest_ticks: int) -> Move:
 def motions(draw: st.DrawFn) -> list[Segment]:
     """A few segments that keep all limits, boundaries included."""
     rests = [10**9] * JOINTS
+    turned = [False] * JOINTS
     segments = []
     for _ in range(draw(st.integers(1, 8))):
-        joints = [draw(moves(rest)) for rest in rests]
+        joints = [draw(moves(*before)) for before in zip(rests, turned, strict=True)]
         last = [step_ticks(move)[-1] if move.steps_dir > 1 else -1 for move in joints]
         duration = max(SHORTEST_SEGMENT_TICKS, max(last) + 1 + draw(st.integers(0, 2000)))
         rests = [duration - tick if tick >= 0 else rest + duration for tick, rest in zip(last, rests, strict=True)]
+        turned = [
+            bool(move.steps_dir & 1) if move.steps_dir > 1 else was for move, was in zip(joints, turned, strict=True)
+        ]
         segments.append(segment_of(duration, *joints))
     return end_motion(segments)
 
@@ -160,7 +164,11 @@ def test_gap_between_runs(firmware: Firmware, gap: int) -> None:
 
 def test_reversal_at_the_least_interval(firmware: Firmware) -> None:
     there_and_back = [
-        segment_of(8 * 800, *[run_of(8, first=0, interval=800, positive=i % 2 == 0)] * 2) for i in range(12)
+        segment_of(
+            39 * MIN_INTERVAL_TICKS + MIN_REVERSAL_TICKS,
+            *[run_of(40, first=0, interval=MIN_INTERVAL_TICKS, positive=i % 2 == 0)] * 2,
+        )
+        for i in range(12)
     ]
     motion = end_motion(there_and_back)
     board = Board(firmware)

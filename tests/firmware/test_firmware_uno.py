@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections import deque
+from fractions import Fraction
 from pathlib import Path
 
 import pytest
@@ -21,6 +23,7 @@ from planarm_wire.codec import decode, encode
 from planarm_wire.framing import Frame, FrameDecoder, encode_frame
 from planarm_wire.messages import (
     BAUD,
+    DELIMITER,
     DIR_PINS,
     ENABLE_PIN,
     HOST_WINDOW_BYTES,
@@ -32,6 +35,7 @@ from planarm_wire.messages import (
     STEP_PINS,
     Fault,
     Hello,
+    Move,
     Query,
     Segment,
     Segments,
@@ -146,7 +150,7 @@ class Streamer:
         queued = sum(1 for _, size in self.in_flight if size > 8)
         while True:
             has_slot = self.waiting and queued < free
-            if not has_slot and not self.busy_line:
+            if not has_slot and not self.busy_line and self.in_flight:
                 return
             message = Segments((self.waiting[0],)) if has_slot else Query()
             frame = encode_frame(self.board.seq, *encode(message))
@@ -160,31 +164,50 @@ class Streamer:
                 queued += 1
 
 
-@pytest.mark.parametrize("busy_line", [False, True], ids=["line as needed", "line saturated"])
-@pytest.mark.parametrize("ratio", [1.0, 1.618])
-def test_full_rate_with_both_joints(emulated_firmware: EmulatedFirmware, busy_line: bool, ratio: float) -> None:
-    # Both joints at the least interval, turning round at every boundary, streamed while they move.
-    slow = round(MIN_INTERVAL_TICKS * ratio)
-    count, duration = 60, 32_000
-    motion = end_motion(
-        [
-            segment_of(
-                duration,
-                run_of(duration // MIN_INTERVAL_TICKS, first=0, interval=MIN_INTERVAL_TICKS, positive=i % 2 == 0),
-                run_of((duration - 7) // slow, first=7, interval=slow, positive=i % 3 == 0),
-            )
-            for i in range(count)
-        ]
-    )
-    board = Board(emulated_firmware)
-    board.get_ready()
-    for segment in motion[:16]:
-        board.ask(Segments((segment,)))
-    board.ask(Start(LEAD_TICKS))
-    status = Streamer(board, motion[16:], busy_line).run(count, 4_000_000)
-    assert (status.fault, status.ring_full, status.overruns, status.crc_errors) == (Fault.NONE, 0, 0, 0)
+def reversing(ratio: float) -> list[Segment]:
+    """Joint 1 at 800 ticks, joint 2 slower by a ratio, both turning round at boundaries 2 ms apart."""
+    interval, duration = 800, 32_000
+    slow = round(interval * ratio)
+    return [
+        segment_of(
+            duration,
+            run_of(duration // interval, first=0, interval=interval, positive=i % 2 == 0),
+            run_of((duration - 7) // slow, first=7, interval=slow, positive=i % 3 == 0),
+        )
+        for i in range(60)
+    ]
+
+
+def fast_moves(duration: int, begun_at: Fraction, interval_q16: int) -> tuple[Move, Fraction]:
+    """A joint's steps at one interval in a segment, from a moment on; and the moment of the first in the next."""
+    first = int(begun_at)
+    steps = ((duration - first) * 65536 - 1) // interval_q16 + 1
+    return Move(2 * steps + 1, first, interval_q16), first + Fraction(steps * interval_q16, 65536) - duration
+
+
+def fast(ratio: float, duration: int, count: int) -> list[Segment]:
+    """Both joints in one direction, joint 1 at the least interval and joint 2 slower by a ratio, without a pause."""
+    intervals = (MIN_INTERVAL_TICKS << 16, round(MIN_INTERVAL_TICKS * ratio * 65536))
+    begun_at = [Fraction(0), Fraction(7)]
+    segments = []
+    for _ in range(count):
+        # A fraction cut off at a boundary shortens the interval there: the next tick is taken instead.
+        moves, begun_at = zip(
+            *(
+                fast_moves(duration, Fraction(math.ceil(at)), interval)
+                for at, interval in zip(begun_at, intervals, strict=True)
+            ),
+            strict=True,
+        )
+        segments.append(segment_of(duration, *moves))
+    return segments
+
+
+def assert_every_edge(board: Board, motion: list[Segment], status: Status) -> None:
+    """No fault, no byte lost in the USART, every rising edge on its tick, every pulse long enough, ledger exact."""
+    assert (status.fault, status.overruns) == (Fault.NONE, 0)
     schedule = Schedule.of(motion)
-    begin = board.rises(0)[0]
+    begin = board.rises(0)[0] - schedule.steps[0][0][0]
     for joint in range(2):
         assert board.rises(joint) == [begin + tick for tick, _ in schedule.steps[joint]]
         edges = [edge for edge in board.edges if edge.pin == STEP_PINS[joint]]
@@ -193,6 +216,50 @@ def test_full_rate_with_both_joints(emulated_firmware: EmulatedFirmware, busy_li
         assert min(highs) >= MIN_STEP_HIGH_TICKS
         assert min(lows) >= MIN_STEP_LOW_TICKS
     assert status.ledger.position_usteps == schedule.positions()
+
+
+@pytest.mark.parametrize("busy_line", [False, True], ids=["line as needed", "window always full"])
+@pytest.mark.parametrize(
+    "motion",
+    [reversing(1.0), reversing(1.618), fast(1.0037, 64_000, 75), fast(1.0, 64_000, 75), fast(1.618, 64_000, 75)],
+    ids=["20 k, both turn", "20 k and 12.4 k, both turn", "50 k and 49.8 k", "50 k", "50 k and 30.9 k"],
+)
+def test_full_rate_with_both_joints(
+    emulated_firmware: EmulatedFirmware, motion: list[Segment], busy_line: bool
+) -> None:
+    # Streamed while the joints move.
+    motion = end_motion(motion)
+    board = Board(emulated_firmware)
+    board.get_ready()
+    for segment in motion[:16]:
+        board.ask(Segments((segment,)))
+    board.ask(Start(LEAD_TICKS))
+    status = Streamer(board, motion[16:], busy_line).run(len(motion), 12_000_000)
+    assert (status.ring_full, status.crc_errors) == (0, 0)
+    assert_every_edge(board, motion, status)
+
+
+def test_two_seconds_at_50_k_on_a_saturated_line(emulated_firmware: EmulatedFirmware) -> None:
+    # Both joints at 50,000 steps/s, 1 : 1.0037, while valid frames fill the line without a gap, whatever the window.
+    # The frames repeat a number, so each is answered by STATUS and none queues anything; many find the ring full.
+    motion = end_motion(fast(1.0037, 1_004_000, QUEUE_SLOTS))
+    board = Board(emulated_firmware)
+    board.get_ready()
+    for segment in motion:
+        board.ask(Segments((segment,)))
+    board.ask(Start(LEAD_TICKS))
+    frame = encode_frame(board.seq - 1, *encode(Segments((motion[0],))))
+    end = board.now + LEAD_TICKS + 1_004_000 * QUEUE_SLOTS + 100_000
+    serial = emulated_firmware.uno.serial
+    while board.now < end:
+        while serial.pending < HOST_WINDOW_BYTES:
+            board.receive(frame)
+        board.run(20_000)
+    board.run(200_000)
+    board.receive(bytes([DELIMITER]))
+    status = board.ask()
+    assert len(board.rises(0)) > 100_000
+    assert_every_edge(board, motion, status)
 
 
 def test_more_bytes_than_the_ring_holds_are_counted_and_harmless(emulated_firmware: EmulatedFirmware) -> None:

@@ -85,6 +85,22 @@ def test_the_place_of_the_build_does_not_matter(tmp_path: Path) -> None:
     assert (tmp_path / "a" / "uno.hex").read_bytes() == (tmp_path / "b" / "uno.hex").read_bytes()
 
 
+@needs_avr_gcc
+def test_a_program_that_uses_a_register_of_the_interrupts_is_refused(tmp_path: Path) -> None:
+    # As a library function could, which the compiler's flags do not bind.
+    copy = tmp_path / "firmware"
+    shutil.copytree(FIRMWARE, copy, ignore=shutil.ignore_patterns("build", ".pio", "__pycache__"))
+    clock = copy / "core" / "clock.cpp"
+    source = clock.read_text(encoding="utf-8")
+    spoilt = source.replace("return extend(counter);", '__asm__ __volatile__("inc r7"); return extend(counter);')
+    assert spoilt != source
+    clock.write_text(spoilt, encoding="utf-8")
+    command = [sys.executable, str(copy / "build.py"), "avr", "--out", str(tmp_path / "out")]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 1
+    assert "uses a register of the interrupts" in done.stderr
+
+
 @needs_gxx
 @needs_pio
 def test_the_cores_own_tests(tmp_path: Path) -> None:

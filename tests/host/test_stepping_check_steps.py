@@ -6,8 +6,8 @@ import pytest
 from motion_paths import joint
 from planarm.stepping.check_steps import check_counts, check_gaps, check_wire
 from planarm.stepping.plan import SegmentPlan
-from planarm.stepping.train import JointSteps, StepTrain
-from planarm_wire.messages import BAUD, Move, Segment
+from planarm.stepping.train import MIN_REVERSAL_TICKS, JointSteps, StepTrain
+from planarm_wire.messages import BAUD, MIN_INTERVAL_TICKS, Move, Segment
 
 REST = Move(0)
 NO_STEPS = JointSteps(np.zeros(0, np.int64), np.zeros(0, np.int8))
@@ -37,15 +37,20 @@ def test_dir_setup_counts_from_the_start_of_the_segment_that_turns(first_ticks, 
     assert verdict_of(checks, "wire limits") == "green"
 
 
-@pytest.mark.parametrize(("ticks", "verdict"), [(2120, "green"), (2119, "red")])
-def test_reversing_takes_an_interval_and_the_dir_setup(ticks, verdict):
-    checks = check_gaps(train_of([1000, ticks], [1, -1]), (joint(), joint()), 1)
+@pytest.mark.parametrize(("gap", "verdict"), [(MIN_REVERSAL_TICKS, "green"), (MIN_REVERSAL_TICKS - 1, "red")])
+def test_reversing_takes_an_interval_and_the_dir_setup(gap, verdict):
+    checks = check_gaps(train_of([1000, 1000 + gap], [1, -1]), (joint(), joint()), 1)
     assert verdict_of(checks, "reversal") == verdict
 
 
 @pytest.mark.parametrize(
     ("gap", "speed", "verdict"),
-    [(800, 100.0, "green"), (799, 100.0, "red"), (3141, 2.0, "green"), (3140, 2.0, "red")],
+    [
+        (MIN_INTERVAL_TICKS, 100.0, "green"),
+        (MIN_INTERVAL_TICKS - 1, 100.0, "red"),
+        (3141, 2.0, "green"),
+        (3140, 2.0, "red"),
+    ],
 )
 def test_an_interval_keeps_the_firmwares_limit_and_the_joints_speed(gap, speed, verdict):
     # 2 rad/s at 16,000 micro-steps a turn are 3141.59 ticks a step.
@@ -71,8 +76,8 @@ def test_a_step_may_be_late_by_a_share_of_the_shorter_interval(error, verdict):
     assert verdict_of(check_counts(wanted, made, 1), "timing") == verdict
 
 
-@pytest.mark.parametrize(("error", "verdict"), [(16, "green"), (17, "red")])
-def test_a_lone_step_may_be_late_by_16_ticks(error, verdict):
+@pytest.mark.parametrize(("error", "verdict"), [(6, "green"), (7, "red")])
+def test_a_lone_step_may_be_late_by_6_ticks(error, verdict):
     checks = check_counts(train_of([1000], [1]), train_of([1000 + error], [1]), 1)
     assert verdict_of(checks, "timing") == verdict
 
@@ -110,9 +115,9 @@ def test_a_burst_of_short_segments_cannot_be_sent_before_there_is_room():
         ((0, REST, REST), "duration 0"),
         ((1 << 30, REST, REST), "duration"),
         ((5000, Move(3, 5000), REST), "outside"),
-        ((5000, REST, Move(5, 1000, 799 << 16)), "intervals of joint 2"),
+        ((5000, REST, Move(5, 1000, (MIN_INTERVAL_TICKS << 16) - 1)), "intervals of joint 2"),
         ((200_000, REST, Move(5, 1000, 60_001 << 16)), "intervals of joint 2"),
-        ((200_000, REST, Move(9, 1000, 900 << 16, -(60 << 16))), "intervals of joint 2"),
+        ((200_000, REST, Move(9, 1000, (MIN_INTERVAL_TICKS + 100) << 16, -(60 << 16))), "intervals of joint 2"),
         ((5000, REST, Move(7, 100, 900 << 16, 1 << 31)), "add of joint 2"),
         ((1 << 29, Move(2 * 32_768, 500, 1000 << 16), REST), "32768 steps of joint 1"),
     ],

@@ -196,4 +196,4 @@ def test_no_motion_is_no_segment():
 
 def test_what_the_firmware_cannot_step_is_refused():
     with pytest.raises(TimingError, match="joint 2"):
-        compress(train_of(NO_STEPS, steps_of([1000, 700])))
+        compress(train_of(NO_STEPS, steps_of([1000, 300])))

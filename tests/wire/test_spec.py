@@ -144,7 +144,7 @@ def test_wording_leaves_the_hash_as_it_is_and_everything_else_changes_it() -> No
     for old, new in (
         ("version = 1\n", "version = 2\n"),
         ('unit = "ticks"', 'unit = "us"'),
-        ("value = 800", "value = 801"),
+        ("value = 320", "value = 321"),
         ("initial 0xFFFF", "initial 0x0000"),
     ):
         assert parse_spec(changed(old, new)).spec_hash != before

@@ -134,6 +134,8 @@ void enable_interrupt(uint8_t joint, bool on) { uno.channels[joint].interrupt_on
 
 bool interrupt_is_on(uint8_t joint) { return uno.channels[joint].interrupt_on; }
 
+bool dir(uint8_t joint) { return uno.dirs[joint]; }
+
 void write_dir(uint8_t joint, bool positive) { set_pin(uno.dirs[joint], positive, wire::DIR_PINS[joint]); }
 
 }  // namespace board

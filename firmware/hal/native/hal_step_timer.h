@@ -21,6 +21,7 @@ bool is_high(uint8_t joint);
 void forget_match(uint8_t joint);
 void enable_interrupt(uint8_t joint, bool on);
 bool interrupt_is_on(uint8_t joint);
+bool dir(uint8_t joint);
 void write_dir(uint8_t joint, bool positive);
 void elapse(uint32_t ticks);
 }  // namespace board
@@ -92,6 +93,11 @@ inline void steps_off() {
 }
 
 inline void wait_step_high() { board::elapse(33); }
+
+template <uint8_t JOINT>
+bool dir_is(bool positive) {
+    return board::dir(JOINT) == positive;
+}
 
 template <uint8_t JOINT>
 void dir_write(bool positive) {

@@ -109,7 +109,13 @@ inline void wait_step_high() {
     __asm__ __volatile__("1: dec %0\n\tbrne 1b" : "+r"(turns));
 }
 
-// DIR is D4 for joint 0 and D5 for joint 1; one instruction, so no lock is needed.
+// DIR is D4 for joint 0 and D5 for joint 1.
+template <uint8_t JOINT>
+HAL_INLINE bool dir_is(bool positive) {
+    return ((PORTD & (JOINT == 0 ? _BV(PORTD4) : _BV(PORTD5))) != 0) == positive;
+}
+
+// One instruction, so no lock is needed.
 template <uint8_t JOINT>
 HAL_INLINE void dir_write(bool positive) {
     constexpr uint8_t mask = JOINT == 0 ? _BV(PORTD4) : _BV(PORTD5);

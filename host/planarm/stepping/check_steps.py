@@ -26,7 +26,7 @@ BITS_PER_BYTE = 10
 """On the line: start bit, eight bits, stop bit."""
 
 TIMING_SHARE = 0.02
-TIMING_TICKS = 16
+TIMING_TICKS = 6
 """Permitted error of a step's time: the greater of the two, the first of the shorter interval around it."""
 
 

@@ -37,7 +37,7 @@ __all__ = ["JointSteps", "StepTrain", "hysteresis_usteps", "quantisation_bound_c
 
 TIMING_USTEPS = 0.045
 """How far a step's timing tolerance can move a joint: 2 % of an interval, where the speed at the step is at most twice
-the mean (rest at the other end), and the rounding to whole ticks of intervals of 800 or more."""
+the mean (rest at the other end), and the rounding to whole ticks of intervals of 320 or more."""
 
 SUBDIVISION = 4
 """Parts of each interval of the trajectory in which the angles are searched for turning points."""

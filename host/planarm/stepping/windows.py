@@ -13,7 +13,7 @@ from planarm.stepping.train import MIN_REVERSAL_TICKS, Directions, JointSteps, S
 from planarm_wire.kernel_cache import kernel
 from planarm_wire.messages import MAX_INTERVAL_TICKS, MAX_SEGMENT_STEPS, MIN_DIR_SETUP_TICKS, MIN_INTERVAL_TICKS
 
-TOLERANCE_TICKS = 16
+TOLERANCE_TICKS = 6
 TOLERANCE_SHARE = 0.02
 """A step may be moved by TOLERANCE_TICKS, or by this share of the shorter of the two intervals around it if larger."""
 

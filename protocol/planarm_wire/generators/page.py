@@ -68,7 +68,8 @@ A segment is good when all of this holds for each joint; anything else latches `
 
 - 1 <= duration <= {max_segment_ticks}, N <= {max_segment_steps}, and T_n < duration for every n;
 - {min_interval_ticks} x 2^16 <= I + n A <= {max_interval_ticks} x 2^16 for n = 0 .. N - 2;
-- its first step comes at least {min_interval_ticks} ticks after the joint's last step in the segments before.
+- its first step comes at least {min_interval_ticks} ticks after the joint's last step in the segments before, and at
+  least {min_reversal_ticks} after it where the direction changes (`min_interval_ticks` + `min_dir_setup_ticks`).
 
 A pulse is high for at least {min_step_high_ticks} ticks and low for at least {min_step_low_ticks} ticks. A direction
 pin changes at least {min_dir_setup_ticks} ticks before the next step rises."""
@@ -86,6 +87,12 @@ must be refused, and segments with the ticks of all their steps. An implementati
 of them."""
 
 
+def _steps(spec: Spec) -> str:
+    limits = {limit.name: limit.value for limit in spec.limits}
+    limits["min_reversal_ticks"] = limits["min_interval_ticks"] + limits["min_dir_setup_ticks"]
+    return _STEPS.format(**{name: f"{value:,}" for name, value in limits.items()})
+
+
 def protocol_md(spec: Spec) -> str:
     """Return the text of docs/protocol.md."""
     sections = {
@@ -94,7 +101,7 @@ def protocol_md(spec: Spec) -> str:
         "Types": _types(),
         "Messages": "\n\n".join(_message(message) for message in spec.messages),
         "Structs": "\n\n".join(_struct(struct) for struct in spec.structs),
-        "Step times": _STEPS.format(**{limit.name: f"{limit.value:,}" for limit in spec.limits}),
+        "Step times": _steps(spec),
         "Limits": _table(
             ("name", "value", "meaning"),
             ((limit.name, f"{limit.value:,}", sentence(limit.doc)) for limit in spec.limits),

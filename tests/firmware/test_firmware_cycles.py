@@ -1,0 +1,172 @@
+"""What the interrupts of the released image take, instruction by instruction on the emulated chip.
+
+The figures are those beside the code, in firmware/hal/uno. Entry takes four cycles and RETI four (ATmega328P datasheet,
+7.7.1); both are counted, and so is the jump from the vector.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from itertools import pairwise
+from pathlib import Path
+
+import pytest
+
+from firmware_board import LEAD_TICKS, Board, EmulatedFirmware, end_motion, run_of, segment_of
+from planarm_wire.messages import STEP_PINS, Fault, Query, Segment, Segments, Start
+
+IMAGE = Path(__file__).parents[2] / "firmware" / "release" / "uno.hex"
+STEP_1, STEP_2, RECEIVE, TRANSMIT = 11, 12, 18, 19  # numbers of the vectors, from 0
+ENTRY_CYCLES = 4
+INTERRUPTS_ON = 0x80
+
+STEP_CYCLES, ONWARD_CYCLES, REVERSED_CYCLES, IDLE_CYCLES = 104, 86, 96, 64
+MISSED_CYCLES, MISSED_REVERSED_CYCLES = 91, 101
+RECEIVE_CYCLES, OVERRUN_CYCLES, FULL_CYCLES = 38, 44, 36
+TRANSMIT_CYCLES = (34, 36)
+
+
+class Tracer(EmulatedFirmware):
+    """The emulated board, run by single instructions; notes (vector, cycles) of every interrupt."""
+
+    def __init__(self, image: Path) -> None:
+        super().__init__(image)
+        self.chip = self.uno._chip
+        self.done: list[tuple[int, int]] = []
+
+    def run(self, ticks: int) -> None:
+        end = self.uno.cycle + ticks
+        while self.uno.cycle < end:
+            self._step()
+        super().run(0)  # takes over what came on pins and line
+
+    def run_until(self, condition: Callable[[], bool]) -> None:
+        while not condition():
+            self._step()
+
+    def hold_interrupts(self, ticks: int) -> None:
+        """Let the main program run on for a while as if it had switched interrupts off."""
+        self.chip.sreg &= ~INTERRUPTS_ON
+        self.uno.run(cycles=ticks)
+        self.chip.sreg |= INTERRUPTS_ON
+
+    def taken(self, vector: int) -> set[int]:
+        return {cycles for number, cycles in self.done if number == vector}
+
+    def _step(self) -> None:
+        chip = self.chip
+        depth = chip.sp
+        chip.run_to(chip.cycle + 1)
+        if chip.pc % 2 or not STEP_1 <= chip.pc // 2 <= TRANSMIT:
+            return
+        vector, begun = chip.pc // 2, chip.cycle - ENTRY_CYCLES
+        assert chip.sp == depth - 2
+        while chip.sp < depth:
+            chip.run_to(chip.cycle + 1)
+        self.done.append((vector, chip.cycle - begun))
+
+
+@pytest.fixture
+def tracer() -> Tracer:
+    return Tracer(IMAGE)
+
+
+def play(tracer: Tracer, segments: list[Segment]) -> Board:
+    """Start a motion, up to its first step; from then on the board runs by single instructions."""
+    board = Board(tracer)
+    fast = super(Tracer, tracer).run
+    tracer.run = fast  # type: ignore[method-assign]
+    board.get_ready()
+    for segment in segments:
+        board.ask(Segments((segment,)))
+    board.send(Start(LEAD_TICKS))
+    board.run(LEAD_TICKS - 1000)
+    del tracer.run
+    return board
+
+
+def highs(board: Board) -> Iterator[int]:
+    """High times of all pulses of joint 1."""
+    edges = [edge for edge in board.edges if edge.pin == STEP_PINS[0]]
+    for rise, fall in pairwise(edges):
+        if rise.level:
+            yield fall.tick - rise.tick
+
+
+@pytest.mark.parametrize("joint", [0, 1])
+def test_step_interrupts(tracer: Tracer, joint: int) -> None:
+    def segment(positive: bool) -> Segment:
+        moves = [run_of(0), run_of(0)]
+        moves[joint] = run_of(5, positive=positive, fraction=40_000, interval=900)
+        return segment_of(6000, *moves)
+
+    board = play(tracer, end_motion([segment(True), segment(True), segment(False)]))
+    board.run(LEAD_TICKS + 25_000)
+    vector = (STEP_1, STEP_2)[joint]
+    assert [cycles for number, cycles in tracer.done if number == vector] == [
+        *[STEP_CYCLES] * 4,
+        ONWARD_CYCLES,
+        *[STEP_CYCLES] * 4,
+        REVERSED_CYCLES,
+        *[STEP_CYCLES] * 4,
+        IDLE_CYCLES,
+    ]
+    assert tracer.taken(RECEIVE) <= {RECEIVE_CYCLES}
+    assert tracer.taken(TRANSMIT) <= set(TRANSMIT_CYCLES)
+    if joint == 0:
+        assert min(highs(board)) >= 48
+
+
+@pytest.mark.parametrize(
+    ("steps", "turns", "cycles"),
+    [(9, False, MISSED_CYCLES), (1, False, MISSED_CYCLES), (1, True, MISSED_REVERSED_CYCLES)],
+)
+def test_an_interrupt_that_comes_too_late_stops_both_joints(
+    tracer: Tracer, steps: int, turns: bool, cycles: int
+) -> None:
+    # Held up by more than an interval, after a step of a run, and after the last one of a run.
+    motion = [
+        segment_of(700 * steps, run_of(steps, first=0, interval=700, positive=not (turns and i % 2))) for i in range(8)
+    ]
+    board = play(tracer, end_motion(motion))
+    tracer.run_until(lambda: len(tracer.taken(STEP_1)) > 0)
+    tracer.hold_interrupts(1500)
+    board.run(400)
+    assert [taken for number, taken in tracer.done if number == STEP_1][-1] == cycles
+    status = board.ask()
+    assert status.fault is Fault.MISSED_DEADLINE
+    assert status.ledger.position_usteps == (board.position_at(0, board.now), 0)
+
+
+def test_receive_interrupt(tracer: Tracer) -> None:
+    board = play(tracer, end_motion([segment_of(200_000, run_of(2))]))
+    tracer.done.clear()
+    board.send(Query())
+    board.run(20_000)
+    assert tracer.taken(RECEIVE) == {RECEIVE_CYCLES}
+    assert tracer.taken(TRANSMIT) == set(TRANSMIT_CYCLES)
+    # Four bytes while interrupts are off: one more than the USART holds.
+    tracer.done.clear()
+    board.receive(bytes(4))
+    tracer.hold_interrupts(5 * 640)
+    board.run(2000)
+    assert tracer.taken(RECEIVE) == {RECEIVE_CYCLES, OVERRUN_CYCLES}
+
+
+def test_receive_interrupt_without_room(tracer: Tracer) -> None:
+    # The main program stands still: the ring fills up.
+    board = play(tracer, end_motion([segment_of(200_000, run_of(2))]))
+    tracer.done.clear()
+    stay = tracer.chip.pc
+    board.receive(bytes(130))
+
+    def received() -> list[int]:
+        return [cycles for number, cycles in tracer.done if number == RECEIVE]
+
+    def all_came() -> bool:
+        if tracer.chip.sreg & INTERRUPTS_ON:
+            tracer.chip.pc = stay
+        return len(received()) == 130
+
+    tracer.run_until(all_came)
+    assert received() == [*[RECEIVE_CYCLES] * 128, *[FULL_CYCLES] * 2]
