@@ -17,6 +17,7 @@ from planarm_wire.messages import (
     MAX_INTERVAL_TICKS,
     MAX_SEGMENT_STEPS,
     MAX_SEGMENT_TICKS,
+    MIN_DIR_SETUP_TICKS,
     MIN_INTERVAL_TICKS,
     QUEUE_SLOTS,
     Fault,
@@ -32,6 +33,7 @@ from planarm_wire.messages import (
 )
 
 LEAST, MOST = MIN_INTERVAL_TICKS, MAX_INTERVAL_TICKS
+BACK = MIN_INTERVAL_TICKS + MIN_DIR_SETUP_TICKS
 ONE = 1 << 16
 
 
@@ -127,6 +129,15 @@ def test_least_interval_across_boundaries(board: Board, gap: int, fault: Fault, 
         for segment in segments:
             status = board.ask(Segments((segment,)))
     assert status.fault is fault
+
+
+@pytest.mark.parametrize(("gap", "fault"), [(BACK, Fault.NONE), (BACK - 1, Fault.BAD_SEGMENT)])
+@pytest.mark.parametrize("positive", [True, False])
+def test_least_time_from_a_step_to_one_back(board: Board, gap: int, fault: Fault, positive: bool) -> None:
+    # The direction is that of the joint's last step, whatever the other joint did and over a rest.
+    there = segment_of(3001, run_of(3, positive=positive), run_of(2, positive=not positive))
+    back = segment_of(5000, run_of(1, first=gap - 101, positive=not positive))
+    assert board.ask(Segments((there, segment_of(100), back))).fault is fault
 
 
 def test_a_joint_that_has_not_moved_has_rested_for_ever(board: Board) -> None:
