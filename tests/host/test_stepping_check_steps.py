@@ -102,6 +102,24 @@ def test_segments_must_not_be_shorter_than_the_line_takes_to_bring_them(slower):
     assert verdict_of(checks, "ahead of the line") == ("green" if slower else "red")
 
 
+@pytest.mark.parametrize(
+    ("interval_ticks", "segments_hz", "verdict"),
+    [
+        (320, 333, "red"),  # the rate at which the board only just keeps up with both joints at 50 k steps/s
+        (320, 250, "green"),
+        (800, 800, "red"),  # the same at 20 k
+        (800, 600, "green"),
+        (8_000, 900, "green"),
+    ],
+)
+def test_the_board_needs_time_to_read_segments(interval_ticks, segments_hz, verdict):
+    """firmware/README.md: sustained segments a second fall with the step rate; the check keeps below them."""
+    duration = 16_000_000 // segments_hz
+    move = Move(2 * (duration // interval_ticks) + 1, 0, interval_ticks << 16)
+    checks = check_wire(plan_of(*[(duration, move, move)] * 2000))
+    assert verdict_of(checks, "ahead of the board") == verdict
+
+
 def test_a_burst_of_short_segments_cannot_be_sent_before_there_is_room():
     # The line is idle for seconds, but the device holds 32 segments and no more.
     long, short = (10**6, Move(3, 1000), REST), (4000, Move(3, 1000), REST)

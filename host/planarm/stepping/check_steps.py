@@ -25,6 +25,15 @@ from planarm_wire.messages import (
 BITS_PER_BYTE = 10
 """On the line: start bit, eight bits, stop bit."""
 
+STEP_INTERRUPT_TICKS = 104
+LINE_LOAD = 0.1
+READ_TICKS = 15_000
+LATEST_READ_TICKS = 20_000
+LEAST_SHARE = 0.05
+"""What the board takes, measured on the emulator (firmware/README.md, budgets): a step's interrupt; the share of the
+line's interrupts; the main program's work on a segment, from the rates at which it just keeps up (12,000 to 15,000);
+and how long before its start a segment must be there. The last keeps an overloaded board's time finite."""
+
 TIMING_SHARE = 0.02
 TIMING_TICKS = 6
 """Permitted error of a step's time: the greater of the two, the first of the shorter interval around it."""
@@ -121,7 +130,7 @@ def check_wire(plan: SegmentPlan) -> list[Check]:
         ticks, where = min(setups)
         checks.append(at_least("DIR setup time", ticks, MIN_DIR_SETUP_TICKS, "ticks", where))
     if plan.segments:
-        checks.append(_check_line(plan))
+        checks += _check_supply(plan)
     return checks
 
 
@@ -161,22 +170,42 @@ def _dir_setups(plan: SegmentPlan) -> list[tuple[int, str]]:
     return found
 
 
-def _check_line(plan: SegmentPlan) -> Check:
-    """Check that every segment can be on the device before it starts, each in a frame of its own.
+def _check_supply(plan: SegmentPlan) -> list[Check]:
+    """Check that the line brings every segment before it starts, each in a frame of its own, and the board reads it.
 
-    The device holds QUEUE_SLOTS segments, so a segment is sent when the one that many before it has ended.
+    The device holds QUEUE_SLOTS segments, so a segment is sent when the one that many before it has ended. Its main
+    program reads them one by one in the time that the interrupts of the running segment leave.
     """
     overhead = HEADER_BYTES + 2 * CRC_BYTES + 1
     starts: Ticks = np.cumsum([0, *(segment.duration_flags >> 1 for segment in plan.segments)], dtype=np.int64)
-    line_tick, worst, where = 0.0, float(starts[-1]), ""
+    loads = [_interrupt_load(segment) for segment in plan.segments]
+    line_tick = board_tick = 0.0
+    line, board = [(float(starts[-1]), "")], [(float(starts[-1]), "")]
     for k, segment in enumerate(plan.segments):
         if k < QUEUE_SLOTS:
             continue  # sent before the start
         ticks = (encoded_bytes(segment) + overhead) * BITS_PER_BYTE * TICKS_HZ / BAUD
         line_tick = max(line_tick, float(starts[k - QUEUE_SLOTS + 1])) + ticks
-        if starts[k] - line_tick < worst:
-            worst, where = float(starts[k]) - line_tick, f"segment {k}, {_time(int(starts[k]))}"
-    return at_least("time ahead of the line", worst / TICKS_HZ, 0.0, "s", where, "link.baud or joints.microsteps")
+        board_tick = max(board_tick, line_tick)
+        running = min(k, int(np.searchsorted(starts, board_tick, side="right")) - 1)
+        board_tick += READ_TICKS / max(1.0 - loads[running], LEAST_SHARE)
+        where = f"segment {k}, {_time(int(starts[k]))}"
+        line.append((float(starts[k]) - line_tick, where))
+        board.append((float(starts[k]) - board_tick - LATEST_READ_TICKS, where))
+    checks = []
+    for name, found, setting in (
+        ("time ahead of the line", line, "link.baud or joints.microsteps"),
+        ("time ahead of the board", board, "joints.microsteps or joints.max_speed_deg_s"),
+    ):
+        ahead_ticks, where = min(found)
+        checks.append(at_least(name, ahead_ticks / TICKS_HZ, 0.0, "s", where, setting))
+    return checks
+
+
+def _interrupt_load(segment: Segment) -> float:
+    """Return the share of the processor that interrupts take while a segment runs and the line is busy."""
+    steps = sum(move.steps_dir >> 1 for move in segment.moves)
+    return LINE_LOAD + STEP_INTERRUPT_TICKS * steps / max(segment.duration_flags >> 1, 1)
 
 
 def _time(tick: int) -> str:
