@@ -36,7 +36,7 @@ class PtyLine:
         try:
             self._fd, slave = pty.openpty()
         except OSError as error:
-            raise BridgeError(f"no pseudo-terminal: {error.strerror}") from error
+            raise BridgeError(f"no pseudo-terminal: {error.strerror or error}") from error
         try:
             tty.setraw(slave)  # bytes pass unchanged also for hosts that set nothing; stays set when all have closed
             self.path = os.ttyname(slave)
