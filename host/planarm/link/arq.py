@@ -95,11 +95,6 @@ class GoBackN:
         """When `on_time` has something to send again; infinity when nothing is in flight."""
         return self._timer_s + self._wait_s if self._outstanding else float("inf")
 
-    @property
-    def oldest_sent_s(self) -> float:
-        """When the oldest frame in flight was last sent; infinity when nothing is in flight."""
-        return self._outstanding[0].sent_s if self._outstanding else float("inf")
-
     def fits(self, frame: bytes) -> bool:
         """Whether `frame` may go out now without exceeding the window."""
         return self.bytes_in_flight + len(frame) <= self.window_bytes

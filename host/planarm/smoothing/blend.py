@@ -47,8 +47,8 @@ def blend_corners(path: Path, free_map: FreeMap, tolerance_cm: float = DEFAULT_T
     if not tolerance_cm > 0.0:
         raise ValueError(f"the tolerance is {tolerance_cm} cm; it must be above 0")
     corners = way_points(path.points_cm)
-    world = free_map.world
-    links = TwoLinks(world.l1_cm, world.l2_cm, (world.base_x_cm, world.base_y_cm), free_map.elbow)
+    arm = free_map.world.arm
+    links = TwoLinks(arm.l1_cm, arm.l2_cm, (arm.base_x_cm, arm.base_y_cm), free_map.elbow)
     legs = np.diff(corners, axis=0)
     lengths = np.hypot(legs[:, 0], legs[:, 1])
     units = legs / lengths[:, None]
@@ -56,7 +56,7 @@ def blend_corners(path: Path, free_map: FreeMap, tolerance_cm: float = DEFAULT_T
     for k in range(1, len(corners) - 1):
         largest = 0.5 * min(lengths[k - 1], lengths[k])
         cuts[k] = _proved_cut(corners[k], units[k - 1], units[k], largest, tolerance_cm, free_map)
-    smooth = _assemble(links, corners, units, lengths, cuts, world.turn_start_rad)
+    smooth = _assemble(links, corners, units, lengths, cuts, arm.turn_start_rad)
     _require_bent_elbow(smooth)
     return smooth
 

@@ -58,36 +58,6 @@ class ArmWorld(NamedTuple):
     arm: TwoLinkArm
     obstacles: ObstacleSet
 
-    @property
-    def l1_cm(self) -> float:
-        """Length of link 1."""
-        return self.arm.l1_cm
-
-    @property
-    def l2_cm(self) -> float:
-        """Length of link 2."""
-        return self.arm.l2_cm
-
-    @property
-    def base_x_cm(self) -> float:
-        """The base's x."""
-        return self.arm.base_x_cm
-
-    @property
-    def base_y_cm(self) -> float:
-        """The base's y."""
-        return self.arm.base_y_cm
-
-    @property
-    def turn_start_rad(self) -> float:
-        """Where theta1's turn begins."""
-        return self.arm.turn_start_rad
-
-    @property
-    def margin_cm(self) -> float:
-        """A pose is free when its clearance exceeds this."""
-        return self.arm.margin_cm
-
 
 def elbow_sides(spec: ArmSpec) -> tuple[ElbowSide, ...]:
     """Return the elbow sides that a scene allows: one, or both for "either"."""
@@ -197,18 +167,6 @@ def region_at(arm: TwoLinkArm, r_cm: float) -> int:
 def obstacle_clearance(world: ArmWorld, ex: float, ey: float, x: float, y: float) -> tuple[float, int]:
     """Return (distance in cm, index) of the obstacle nearest to the links, given elbow and tip; (inf, -1) for none."""
     return two_link_clearance(world.arm.base_x_cm, world.arm.base_y_cm, ex, ey, x, y, world.obstacles, inf)
-
-
-@kernel
-def distance_region(world: ArmWorld, r_cm: float) -> int:
-    """Return the region that a tip's distance from the base alone decides, FREE when it forbids nothing."""
-    return region_at(world.arm, r_cm)
-
-
-@kernel
-def elbow_position(world: ArmWorld, x_cm: float, y_cm: float, r_cm: float) -> tuple[float, float]:
-    """Return the elbow's (x, y) for a tip at (x, y), at distance r from the base."""
-    return elbow_at(world.arm, x_cm, y_cm, r_cm)
 
 
 @kernel
