@@ -1,10 +1,25 @@
 """Settings of all tests."""
 
 import os
+from collections.abc import Callable
 
+import pytest
 from hypothesis import settings
 
 # A clean checkout's verdict must not depend on the day: there Hypothesis draws the same examples each time.
 settings.register_profile("same-examples", derandomize=True)
 if os.environ.get("CI"):
     settings.load_profile("same-examples")
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    parser.addoption(
+        "--full", action="store_true", help="run campaigns at the size that proves the claim (minutes each)"
+    )
+
+
+@pytest.fixture(scope="session")
+def sized(pytestconfig: pytest.Config) -> Callable[[int, int], int]:
+    """`sized(small, full)`: how many cases a campaign takes, the small slice unless `--full` is given."""
+    full = bool(pytestconfig.getoption("--full"))
+    return lambda small, whole: whole if full else small

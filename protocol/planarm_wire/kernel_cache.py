@@ -3,17 +3,19 @@
 Numba's own cache looks only at the file that holds a function. It misses an edit in a function called
 from another file, an edit of a constant imported from another file (globals are frozen into the compiled
 code), and it wants to write beside the sources, which a read-only install does not allow. Here the cache
-of each package lives in a folder per user whose name is a hash of everything that can end up in the
-package's compiled code:
+of each module lives in a folder per user whose name is a hash of everything that can end up in the
+module's compiled code:
 
-- every source file of the package that mentions `kernel_cache`, and all files of the package or of
-  `planarm_wire` that those import, directly or not;
+- the module's source, and all files of its package or of `planarm_wire` that it imports, directly or not;
 - the versions of Python and Numba, and the NUMBA_ settings of the environment (bounds checks, for one,
   change the code).
 
+So a kernel may call and freeze what its module imports at the left margin; a kernel that is handed another
+as an argument would escape the hash, and the house has none.
+
 Folder: `PLANARM_CACHE_DIR` when set, else the user's cache folder (`XDG_CACHE_HOME` or `~/.cache`, on
 macOS `~/Library/Caches`, on Windows `%LOCALAPPDATA%`), else, when that cannot be written, a folder of the
-user's own below the system's temporary folder. The latest 16 builds of a package are kept.
+user's own below the system's temporary folder. The latest 16 builds of a module are kept.
 
 Why it lives in `planarm_wire`: host and emulator both compile kernels, neither may import the other, and
 the wire is the one package below both. Numba is imported here only, when the first kernel is decorated.
@@ -41,7 +43,7 @@ F = TypeVar("F", bound=Callable[..., Any])
 CACHE_DIR_VARIABLE = "PLANARM_CACHE_DIR"
 KEPT_BUILDS = 16
 
-_MARK = b"kernel_cache"
+_DECORATED = re.compile(rb"^@kernel$", re.M)
 _KEY_NAME = re.compile(r"[0-9a-f]{16}")
 # An import at the left margin: the module, then what it takes from it (one line, or a bracket over several).
 _IMPORT = re.compile(rb"^(?:from[ \t]+([\w.]+)[ \t]+import[ \t]+(\([^)]*\)|[^\n]*)|import[ \t]+([^\n]*))", re.M)
@@ -60,8 +62,9 @@ def kernel(function: F) -> F:
     config: Any = numba.config
     if config.DISABLE_JIT:
         return function
-    package = function.__module__.partition(".")[0]
-    folder = _prepared_folder(package, "" if _package_folders(package) else function.__code__.co_filename)
+    source = Path(function.__code__.co_filename)
+    inside = "" if source.stem != "__init__" else ".__init__"  # a package's own file, see _module_name
+    folder = _prepared_folder(function.__module__ + inside, source)
     with _config_lock:
         before = config.CACHE_DIR
         config.CACHE_DIR = str(folder)  # read by njit when it makes the function's cache, that is here
@@ -73,32 +76,48 @@ def kernel(function: F) -> F:
 
 
 def is_cold(package: str) -> bool:
-    """Tell whether no kernel of the top-level `package`, as it is now, was compiled for this user yet.
+    """Tell whether most of the top-level `package`'s kernels, as they are now, were not compiled for this user yet.
 
     Imports neither Numba nor the package, so that a command can say that its first run takes longer.
     """
     if os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0"):
         return False
-    return next(cache_folder(package).rglob("*.nbi"), None) is None
+    folders = kernel_folders(package)
+    compiled = sum(next(folder.rglob("*.nbi"), None) is not None for folder in folders.values())
+    return 2 * compiled < len(folders)
 
 
-def cache_folder(package: str) -> Path:
-    """Return the folder for the compiled kernels of `package` as it is now; it may not exist yet."""
-    if not _package_folders(package):
-        raise ModuleNotFoundError(f"there is no package {package!r} here, so it has no kernels", name=package)
-    return _user_root() / "kernels" / package / _key(package, "")
+def kernel_folders(package: str) -> dict[str, Path]:
+    """Return, for each module of `package` that holds kernels, the folder for its compiled code; it may not exist.
+
+    Raises:
+        ModuleNotFoundError: there is no such package here.
+    """
+    found = {}
+    for top in _package_folders(package):
+        for path in sorted(top.rglob("*.py")):
+            if _DECORATED.search(_text(path)):
+                module = _module_name(package, top, path)
+                found[module] = _folder(module, path)
+    if not found:
+        raise ModuleNotFoundError(f"there is no package {package!r} with kernels here", name=package)
+    return found
 
 
 @functools.cache
-def _prepared_folder(package: str, source: str) -> Path:
-    """Make the package's folder, mark it as used now, and drop the oldest builds beyond KEPT_BUILDS."""
-    folder = _user_root() / "kernels" / package / _key(package, source)
+def _prepared_folder(module: str, source: Path) -> Path:
+    """Make the module's folder, mark it as used now, and drop the oldest builds beyond KEPT_BUILDS."""
+    folder = _folder(module, source)
     folder.mkdir(parents=True, exist_ok=True)
     os.utime(folder)
     builds = sorted((b for b in folder.parent.iterdir() if _KEY_NAME.fullmatch(b.name)), key=_mtime, reverse=True)
     for old in builds[KEPT_BUILDS:]:
         shutil.rmtree(old, ignore_errors=True)
     return folder
+
+
+def _folder(module: str, source: Path) -> Path:
+    return _user_root() / "kernels" / module / _key(module, source)
 
 
 def _mtime(path: Path) -> float:
@@ -108,19 +127,24 @@ def _mtime(path: Path) -> float:
         return 0.0
 
 
-@functools.cache
-def _key(package: str, source: str) -> str:
-    """Hash what can end up in the compiled code of `package`; `source` is its file when it is one module."""
-    folders = _package_folders(package)
+def _key(module: str, source: Path) -> str:
+    """Hash what can end up in the compiled code of `module`, whose file is `source`."""
     digest = hashlib.sha256()
     settings = sorted(item for item in os.environ.items() if item[0].startswith("NUMBA_"))
     digest.update(repr((sys.version, metadata.version("numba"), settings)).encode())
-    for name, text in sorted(_kernel_sources(package, folders, Path(source)).items()):
+    for name, path in sorted(_closure(module, source).items()):
+        text = _text(path)
         digest.update(f"\n{name}\n{len(text)}\n".encode())
         digest.update(text)
     return digest.hexdigest()[:16]
 
 
+@functools.cache
+def _text(path: Path) -> bytes:
+    return path.read_bytes()
+
+
+@functools.cache
 def _package_folders(package: str) -> list[Path]:
     """Return where the package's files are; nothing for a single module, a script or an unknown name."""
     if package in sys.modules:
@@ -129,24 +153,18 @@ def _package_folders(package: str) -> list[Path]:
     return [Path(folder) for folder in (spec.submodule_search_locations or ())] if spec else []
 
 
-def _kernel_sources(package: str, folders: list[Path], source: Path) -> dict[str, bytes]:
-    """Return the text, by dotted module name, of every file that can take part in the compiled code."""
-    roots = {package: folders, "planarm_wire": [Path(__file__).parent]}
-    found: dict[str, bytes] = {}
-    if not folders and source.is_file():
-        found[package] = source.read_bytes()
-    for folder in folders:
-        for path in folder.rglob("*.py"):
-            text = path.read_bytes()
-            if _MARK in text:
-                found[_module_name(package, folder, path)] = text
+def _closure(module: str, source: Path) -> dict[str, Path]:
+    """Return the file, by dotted module name, of everything that can take part in the module's compiled code."""
+    package = module.partition(".")[0]
+    roots = {package: _package_folders(package), "planarm_wire": [Path(__file__).parent]}
+    found = {module: source} if source.is_file() else {}
     waiting = list(found.items())
     while waiting:
         for imported in _imported_modules(*waiting.pop()):
             file = _find_module(imported, roots)
             if file is not None and imported not in found:
-                found[imported] = file.read_bytes()
-                waiting.append((imported, found[imported]))
+                found[imported] = file
+                waiting.append((imported, file))
     return found
 
 
@@ -155,8 +173,13 @@ def _module_name(package: str, folder: Path, path: Path) -> str:
     return ".".join((package, *path.relative_to(folder).with_suffix("").parts))
 
 
-def _imported_modules(name: str, text: bytes) -> Iterator[str]:
-    """Yield the dotted names that a module's imports at the left margin may mean; some are no modules."""
+@functools.cache
+def _imported_modules(name: str, path: Path) -> tuple[str, ...]:
+    """Return the dotted names that a module's imports at the left margin may mean; some are no modules."""
+    return tuple(_read_imports(name, _text(path)))
+
+
+def _read_imports(name: str, text: bytes) -> Iterator[str]:
     for base, names, plain in _IMPORT.findall(text):
         if plain:
             targets = [n.decode() for n in _NAME.findall(plain)]

@@ -74,6 +74,25 @@ def test_an_edit_in_a_callee_or_its_constant_is_not_served_stale(package: Path, 
     assert run(package, cache) == ["True", "False", "16", "0", "False"]
 
 
+def test_an_edit_in_a_caller_leaves_its_callee_compiled(package: Path, tmp_path: Path) -> None:
+    cache = tmp_path / "cache"
+    run(package, cache)
+    caller = package / "caller.py"
+    caller.write_text(caller.read_text().replace("+ 1", "+ 2"))
+    assert run(package, cache) == ["False", "False", "4", "0", "False"]
+    builds = {path.name: len(list(path.iterdir())) for path in (cache / "kernels").iterdir()}
+    assert builds == {"arm_kernels.caller": 2, "arm_kernels.callee": 1}
+
+
+def test_kernels_of_a_packages_own_file_follow_its_relative_imports(package: Path, tmp_path: Path) -> None:
+    caller = package / "caller.py"
+    (package / "__init__.py").write_text(caller.read_text().replace("arm_kernels.callee", ".callee"))
+    caller.write_text("from arm_kernels import answer\n")
+    assert run(package, tmp_path / "cache")[2] == "3"
+    (package / "constants.py").write_text("FACTOR = 5\n")
+    assert run(package, tmp_path / "cache")[2:4] == ["6", "0"]
+
+
 def test_a_read_only_install_is_cached_for_the_user(package: Path, tmp_path: Path) -> None:
     before = sorted(p.relative_to(package) for p in package.rglob("*"))
     for path in (*package.iterdir(), package):
@@ -135,13 +154,15 @@ def test_the_platforms_cache_folder_is_used(tmp_path: Path, monkeypatch: pytest.
 
 def test_only_the_latest_builds_are_kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(kernel_cache, "_user_root", lambda: tmp_path)
-    builds = tmp_path / "kernels" / "planarm_wire"
+    source = tmp_path / "small.py"
+    source.write_text("")
+    builds = tmp_path / "kernels" / "small"
     for age in range(kernel_cache.KEPT_BUILDS + 3):
         old = builds / f"{age:016x}"
         old.mkdir(parents=True)
         os.utime(old, (1000 - age, 1000 - age))
     (builds / "not_a_build").mkdir()
-    folder = kernel_cache._prepared_folder.__wrapped__("planarm_wire", "")
+    folder = kernel_cache._prepared_folder.__wrapped__("small", source)
     left = {b.name for b in builds.iterdir()}
     assert folder.name in left
     assert left == {folder.name, "not_a_build", *(f"{age:016x}" for age in range(kernel_cache.KEPT_BUILDS - 1))}
