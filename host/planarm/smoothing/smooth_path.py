@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from planarm.model.kinematics import ElbowSide
+from planarm.smoothing.joint_state import joint_states
 
 Floats = NDArray[np.float64]
 Side = Literal["left", "right"]
@@ -70,35 +71,35 @@ class SmoothPath:
 
     def tip_cm(self, s: Floats) -> Floats:
         """Return the tip's positions, shape (m, 2), at s of shape (m,)."""
-        return self._tip_states(s, "right")[0]
+        s = np.asarray(s, np.float64)
+        if len(self.borders_s) == 1:
+            return np.tile(self.tips_cm[0], (len(s), 1))
+        piece = np.clip(np.searchsorted(self.borders_s, s, side="right") - 1, 0, len(self.slopes) - 1)
+        into = (s - self.borders_s[piece])[:, None]
+        tip: Floats = self.tips_cm[piece] + into * (self.slopes[piece] + 0.5 * into * self.bends_per_cm[piece])
+        return tip
 
     def evaluate(self, s: Floats, side: Side = "right") -> JointState:
         """Return joint angles and derivatives at s of shape (m,); at a border, of the piece on the given side.
 
-        NaN or infinite where the arm does not reach, or where it is straight (|theta2| = 0 or pi).
+        NaN where the arm does not reach; the derivatives also where it is straight (|theta2| = 0 or pi).
         """
-        tip, slope, bend, direction = self._tip_states(s, side)
-        with np.errstate(invalid="ignore", divide="ignore"):
-            return _joint_state(self.links, tip, slope, bend, direction)
+        s = np.ascontiguousarray(s, np.float64)
+        if len(self.borders_s) == 1:
+            q_rad = joint_angles(self.links, self.tips_cm, self.directions_rad)
+            rest = np.zeros((len(s), 2))
+            return JointState(rest + q_rad, rest, rest.copy())
+        links = self.links
+        arm = np.array([links.l1_cm, links.l2_cm, *links.base_cm, -1.0 if links.elbow == "up" else 1.0])
+        pieces = np.concatenate([self.slopes, self.bends_per_cm], axis=1)
+        return JointState(
+            *joint_states(arm, self.borders_s, self.tips_cm, pieces, self.directions_rad, s, side == "right")
+        )
 
     def place(self, s: float) -> str:
         """Say where s is: along the path, and the tip's position."""
         x, y = self.tip_cm(np.array([s]))[0]
         return f"path {s:.2f} of {self.length_cm:.2f} cm, tip ({x:.2f}, {y:.2f}) cm"
-
-    def _tip_states(self, s: Floats, side: Side) -> tuple[Floats, Floats, Floats, Floats]:
-        """Return tip, d(tip)/ds, d2(tip)/ds2 and the tip's direction from the base, at each s."""
-        s = np.asarray(s, np.float64)
-        if len(self.borders_s) == 1:
-            rest = np.zeros((len(s), 2))
-            return rest + self.tips_cm[0], rest, rest, np.full(len(s), self.directions_rad[0])
-        piece = np.searchsorted(self.borders_s, s, side=side) - 1
-        piece = np.clip(piece, 0, len(self.slopes) - 1)
-        into = (s - self.borders_s[piece])[:, None]
-        start, slope, bend = self.tips_cm[piece], self.slopes[piece], self.bends_per_cm[piece]
-        tip = start + into * (slope + 0.5 * into * bend)
-        direction = self.directions_rad[piece] + angle_between(start - self.links.base_cm, tip - self.links.base_cm)
-        return tip, slope + into * bend, bend, direction
 
 
 def angle_between(a: Floats, b: Floats) -> Floats:
@@ -117,32 +118,3 @@ def joint_angles(links: TwoLinks, tip_cm: Floats, direction_rad: Floats) -> Floa
     with np.errstate(invalid="ignore"):
         q2 = np.arccos(cos_q2) * (-1.0 if links.elbow == "up" else 1.0)
     return np.stack([direction_rad - np.arctan2(l2 * np.sin(q2), l1 + l2 * np.cos(q2)), q2], axis=1)
-
-
-def _joint_state(links: TwoLinks, tip_cm: Floats, slope: Floats, bend: Floats, direction_rad: Floats) -> JointState:
-    """Return the joints' angles and derivatives for a tip with given first and second derivative.
-
-    tip' = J q', and tip'' = J q'' - e (q1')^2 - f (q1' + q2')^2
-    with e from the base to the elbow and f from the elbow to the tip, since each link's end is accelerated to its
-    centre; both are solved with J = [perp(e + f), perp(f)], whose determinant is e x f.
-    """
-    q = joint_angles(links, tip_cm, direction_rad)
-    heading1, heading2 = q[:, 0], q.sum(axis=1)
-    e = links.l1_cm * np.stack([np.cos(heading1), np.sin(heading1)], axis=1)
-    f = links.l2_cm * np.stack([np.cos(heading2), np.sin(heading2)], axis=1)
-    dq = _solve_jacobian(e, f, slope)
-    turn1, turn2 = dq[:, :1], dq.sum(axis=1, keepdims=True)
-    ddq = _solve_jacobian(e, f, bend + e * turn1**2 + f * turn2**2)
-    return JointState(q, dq, ddq)
-
-
-def _solve_jacobian(e: Floats, f: Floats, velocity: Floats) -> Floats:
-    """Return the joint rates that move the tip by `velocity`.
-
-    The tip's velocity is perp(e) w1 + perp(f) w2 with the turning rates w1 of link 1 and w2 of link 2. Its scalar
-    product with f removes w2, and with e removes w1: perp(e) . f = -(f x e) = e x f, perp(f) . e = -(e x f).
-    """
-    determinant = e[:, 0] * f[:, 1] - e[:, 1] * f[:, 0]
-    turn1 = (velocity * f).sum(axis=1) / determinant
-    turn2 = -(velocity * e).sum(axis=1) / determinant
-    return np.stack([turn1, turn2 - turn1], axis=1)

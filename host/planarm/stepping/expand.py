@@ -1,4 +1,7 @@
-"""Segments back to steps, in Python's own integers: the independent check of everything that makes segments."""
+"""Segments back to steps, all at once: the independent check of everything that makes segments.
+
+`planarm_wire.steps` says the same step by step, in Python's own integers; a test holds both together.
+"""
 
 import numpy as np
 
@@ -7,23 +10,21 @@ from planarm.stepping.train import JointSteps, StepTrain
 
 
 def expand(plan: SegmentPlan) -> StepTrain:
-    """Return the steps that the segments stand for, on their ticks from the motion's start."""
-    joints = len(plan.start_usteps)
-    ticks: list[list[int]] = [[] for _ in range(joints)]
-    directions: list[list[int]] = [[] for _ in range(joints)]
-    begin = 0
-    for segment in plan.segments:
-        for j, move in enumerate(segment.moves):
-            count, positive = divmod(move.steps_dir, 2)
-            at_q16, interval_q16 = 0, move.interval_q16
-            for _ in range(count):
-                ticks[j].append(begin + move.first_ticks + at_q16 // 65536)
-                directions[j].append(1 if positive else -1)
-                at_q16 += interval_q16
-                interval_q16 += move.add_q16
-        begin += segment.duration_flags // 2
-    steps = tuple(
-        JointSteps(np.array(at, np.int64), np.array(signs, np.int8))
-        for at, signs in zip(ticks, directions, strict=True)
-    )
-    return StepTrain(plan.start_usteps, steps, begin)
+    """Return the steps that the segments stand for, on their ticks from the motion's start.
+
+    64 bits hold every term: n < 2^15 steps, intervals below 2^32 and adds below 2^31 in size, in ticks / 2^16.
+    """
+    durations = np.array([segment.duration_flags >> 1 for segment in plan.segments], np.int64)
+    begins = np.cumsum(durations) - durations
+    steps = []
+    for j in range(len(plan.start_usteps)):
+        moves = [segment.moves[j] for segment in plan.segments]
+        table = np.array([(m.steps_dir, m.first_ticks, m.interval_q16, m.add_q16) for m in moves], np.int64)
+        steps_dir, first, interval, add = table.reshape(-1, 4).T
+        counts = steps_dir >> 1
+        run = np.repeat(np.arange(len(counts)), counts)
+        n = np.arange(len(run)) - (np.cumsum(counts) - counts)[run]
+        since_first = (n * interval[run] + n * (n - 1) // 2 * add[run]) >> 16
+        signs = np.where(steps_dir & 1, 1, -1).astype(np.int8)
+        steps.append(JointSteps((begins + first)[run] + since_first, signs[run]))
+    return StepTrain(plan.start_usteps, tuple(steps), int(durations.sum()))

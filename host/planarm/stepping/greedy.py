@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from planarm.stepping.fit import fit_run
-from planarm.stepping.windows import GAP, HIGH, LOW, RUN_END, SETUP, Windows
+from planarm.stepping.windows import GAP, HIGH, LOW, RUN_END, SETUP, TICK, Windows
 from planarm_wire.kernel_cache import kernel
 from planarm_wire.messages import MAX_SEGMENT_TICKS
 
@@ -21,29 +21,27 @@ COUNT, FIRST, INTERVAL, ADD = 0, 1, 2, 3
 NEVER = -(1 << 62)
 
 
-def cut(windows: Windows, order: Ticks, duration_ticks: int) -> tuple[list[int], list[Ticks]]:
+def cut(windows: Windows, duration_ticks: int) -> tuple[list[int], list[Ticks]]:
     """Return (ends, runs): the tick at which each segment ends, and its runs, shape (joints, 4).
 
     By the invariant the last end is `duration_ticks`; the caller expands and checks it.
 
     Args:
         windows: the steps.
-        order: the joint of each step of all joints, in the order of time.
         duration_ticks: the motion's end, where the last segment ends.
     """
     joints = len(windows.least_interval)
     following, last = windows.first[:-1].copy(), np.full(joints, NEVER)
     ends, runs = [], []
-    begin, done, length = 0, 0, 1
+    begin, length = 0, 1
     while 0 <= begin < duration_ticks:
         best = np.zeros((joints, 4), np.int64)
-        end, length = longest(windows, order, done, following, last, begin, duration_ticks, length, best)
+        end, length = longest(windows, following, last, begin, duration_ticks, length, best)
         for j, (count, first, interval, add) in enumerate(best.tolist()):
             if count > 0:
                 n = count - 1
                 last[j] = begin + first + ((n * interval + n * (n - 1) // 2 * add) >> 16)
         following += best[:, COUNT]
-        done += int(best[:, COUNT].sum())
         ends.append(end)
         runs.append(best)
         begin = end
@@ -53,8 +51,6 @@ def cut(windows: Windows, order: Ticks, duration_ticks: int) -> tuple[list[int],
 @kernel
 def longest(
     windows: Windows,
-    order: Ticks,
-    done: int,
     following: Ticks,
     last: Ticks,
     begin: int,
@@ -65,13 +61,15 @@ def longest(
     """Find the longest segment from `begin`: fill `best`, return its end and its number of steps."""
     joints = best.shape[0]
     trial = np.zeros((joints, 4), np.int64)
-    left = order.shape[0] - done
+    left = 0
+    for j in range(joints):
+        left += windows.first[j + 1] - following[j]
     fits, fails = 0, left + 1
     size = min(guess, left)
     best_end, choice = -1, 0
     while size > fits or (fits == 0 and choice < joints + 2):
         if size > fits:
-            count_steps(order, done, size, trial)
+            count_steps(windows, following, size, trial)
         else:
             count_choice(windows, following, choice, trial)
             choice += 1
@@ -87,12 +85,17 @@ def longest(
 
 
 @kernel
-def count_steps(order: Ticks, done: int, size: int, trial: Ticks) -> None:
-    """Fill in how many of the next `size` steps are each joint's."""
+def count_steps(windows: Windows, following: Ticks, size: int, trial: Ticks) -> None:
+    """Fill in how many of the next `size` steps, in the order of time, are each joint's; as many must be left."""
     for j in range(trial.shape[0]):
         trial[j, COUNT] = 0
-    for i in range(done, done + size):
-        trial[order[i], COUNT] += 1
+    for _ in range(size):
+        soonest, tick = 0, -NEVER
+        for j in range(trial.shape[0]):
+            n = following[j] + trial[j, COUNT]
+            if n < windows.first[j + 1] and windows.steps[n, TICK] < tick:
+                soonest, tick = j, windows.steps[n, TICK]
+        trial[soonest, COUNT] += 1
 
 
 @kernel

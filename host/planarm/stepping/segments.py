@@ -27,9 +27,7 @@ def compress(train: StepTrain) -> SegmentPlan:
     if train.duration_ticks == 0:
         return SegmentPlan((), 0, train.start_usteps)
     windows = windows_of(train)
-    joint_of = np.repeat(np.arange(len(train.steps)), np.diff(windows.first))
-    order = joint_of[np.argsort(np.concatenate([joint.ticks for joint in train.steps]), kind="stable")]
-    ends, runs = cut(windows, order, train.duration_ticks)
+    ends, runs = cut(windows, train.duration_ticks)
     plan = SegmentPlan(_segments(train, ends, runs), train.duration_ticks, train.start_usteps)
     _require_same_steps(train, expand(plan))
     return plan

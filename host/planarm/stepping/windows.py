@@ -22,16 +22,17 @@ class Windows(NamedTuple):
     """The steps of all joints, one joint after the other."""
 
     steps: Ticks
-    """Shape (steps of all joints, 5), with the columns below."""
+    """Shape (steps of all joints, 6), with the columns below."""
     first: Ticks
     """Index of each joint's first step, then the number of all, shape (joints + 1,)."""
     least_interval: Ticks
     """Least interval of each joint in one direction, shape (joints,)."""
 
 
-LOW, HIGH, GAP, SETUP, RUN_END = 0, 1, 2, 3, 4
+LOW, HIGH, GAP, SETUP, RUN_END, TICK = 0, 1, 2, 3, 4, 5
 """Columns of a step: earliest and latest tick; least ticks since the joint's step before; least ticks since the start
-of the step's segment, above 0 where DIR may change; index after the last step that may share a run with this one."""
+of the step's segment, above 0 where DIR may change; index after the last step that may share a run with this one; the
+exact tick."""
 
 
 def tolerance_ticks(steps: JointSteps) -> Ticks:
@@ -54,10 +55,11 @@ def windows_of(train: StepTrain) -> Windows:
     """Return the windows of all steps."""
     first = np.cumsum([0, *(len(joint.ticks) for joint in train.steps)], dtype=np.int64)
     least = np.array([least_interval_ticks(joint) for joint in train.steps], np.int64)
-    steps = np.empty((first[-1], 5), np.int64)
+    steps = np.empty((first[-1], 6), np.int64)
     for j, joint in enumerate(train.steps):
         part = steps[first[j] : first[j + 1]]
         tolerance = tolerance_ticks(joint)
+        part[:, TICK] = joint.ticks
         part[:, LOW] = joint.ticks - tolerance
         part[:, HIGH] = np.minimum(joint.ticks + tolerance, train.duration_ticks - 1)
         _tighten(joint.ticks, joint.directions, least[j], part)
