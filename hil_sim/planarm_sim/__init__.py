@@ -11,7 +11,20 @@
 
 from __future__ import annotations
 
-from planarm_sim.board import Pin, Uno, UnoSnapshot
+from typing import TYPE_CHECKING
+
 from planarm_sim.errors import SimError
 
+if TYPE_CHECKING:
+    from planarm_sim.board import Pin, Uno, UnoSnapshot
+
 __all__ = ["Pin", "SimError", "Uno", "UnoSnapshot"]
+
+
+def __getattr__(name: str) -> object:
+    """Import the board when it is first asked for: the pytest plugin is in every test run, Numba need not be."""
+    if name in __all__:
+        from planarm_sim import board  # noqa: PLC0415 - that is the point
+
+        return vars(board)[name]
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

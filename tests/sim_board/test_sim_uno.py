@@ -172,6 +172,27 @@ def test_pending_counts_what_is_still_on_the_line(echo):
     assert echo.serial.pending == 0
 
 
+def test_the_log_has_every_frame_both_ways_with_its_cycles(echo):
+    echo.serial.clear_log()
+    start = echo.cycle
+    echo.serial.write(b"ab")
+    kept = echo.snapshot()
+    echo.run(seconds=0.001)
+    log = echo.serial.log
+    to_board, from_board = log[log["direction"] == 0], log[log["direction"] == 1]
+    assert to_board.tolist() == [
+        (start + n * BYTE_CYCLES, start + (n + 1) * BYTE_CYCLES, 0, b) for n, b in enumerate(b"ab")
+    ]
+    assert from_board["byte"].tolist() == list(b"bc"), "echo.S adds one"
+    assert (from_board["end"] - from_board["start"]).tolist() == [BYTE_CYCLES] * 2
+    assert np.all(np.diff(log["end"]) >= 0)
+    echo.restore(kept)
+    echo.run(seconds=0.001)
+    assert echo.serial.log.tolist() == log.tolist()
+    echo.serial.clear_log()
+    assert len(echo.serial.log) == 0
+
+
 @settings(deadline=None, max_examples=25)
 @given(st.integers(9_600, 2_000_000), st.integers(1, 60), st.integers(1, 60))
 def test_pacing_never_drifts(baud, first, second):

@@ -9,9 +9,12 @@ from __future__ import annotations
 
 from collections import deque
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
+from planarm_sim.board.serial_log import FROM_BOARD, TO_BOARD, SerialLog, SerialLogState
 from planarm_sim.cpu.chip import Chip
 from planarm_sim.errors import UsageError
 
@@ -33,6 +36,7 @@ class SerialState:
     ends: tuple[int, ...]
     received: bytes
     framing_errors: int
+    log: SerialLogState
 
 
 class SerialPort:
@@ -50,6 +54,7 @@ class SerialPort:
         self._ends: deque[int] = deque()  # ends of the stop bits still to come
         self._received = bytearray()
         self._framing_errors = 0
+        self._log = SerialLog()
         self.baud = baud
 
     @property
@@ -92,9 +97,11 @@ class SerialPort:
             self._burst_start, self._burst_bytes = self._chip.cycle, 0
         bit_cycles = CLOCK_HZ / self._baud
         for byte in data:
-            self._chip.push_rx(self._line_free_cycle(), bit_cycles, byte)
+            start = self._line_free_cycle()
+            self._chip.push_rx(start, bit_cycles, byte)
             self._burst_bytes += 1
             self._ends.append(self._line_free_cycle())
+            self._log.add(start, self._ends[-1], TO_BOARD, byte)
 
     def read(self) -> bytes:
         """Take everything received so far."""
@@ -109,6 +116,10 @@ class SerialPort:
     def collect(self) -> None:
         """Fetch the frames that the chip has sent; the board calls this after every run."""
         frames = self._chip.drain_tx()
+        if len(frames) == 0:
+            return
+        ends = frames["cycle"]
+        self._log.extend(ends - FRAME_BITS * frames["bit_cycles"].astype(np.int64), ends, FROM_BOARD, frames["byte"])
         if np.all(frames["bit_cycles"].astype(np.int64) * self._baud == CLOCK_HZ):
             self._received += frames["byte"].astype(np.uint8).tobytes()
         else:
@@ -124,6 +135,7 @@ class SerialPort:
             tuple(self._ends),
             bytes(self._received),
             self._framing_errors,
+            self._log.snapshot(),
         )
 
     def restore(self, state: SerialState) -> None:
@@ -133,6 +145,22 @@ class SerialPort:
         self._ends = deque(state.ends)
         self._received = bytearray(state.received)
         self._framing_errors = state.framing_errors
+        self._log.restore(state.log)
+
+    @property
+    def log(self) -> NDArray[Any]:
+        """Every frame on the wire both ways since power-up, or since `clear_log`, in order of its stop bit.
+
+        Returns:
+            Structured array: start, end (int64: cycles at which its start bit begins and its stop bit ends), direction
+            (uint8: 0 to the board, 1 from it) and byte (uint16, as its sender meant it). A frame that is still on its
+            way to the board is there, one that the board has not finished is not.
+        """
+        return self._log.recorded()
+
+    def clear_log(self) -> None:
+        """Forget the frames recorded so far; for runs without end."""
+        self._log = SerialLog()
 
     def _line_free_cycle(self) -> int:
         """First cycle after the last byte written; exact, so that no rounding adds up over a burst."""

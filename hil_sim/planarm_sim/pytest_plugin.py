@@ -1,0 +1,150 @@
+"""The pytest plugin: an emulated Uno as a fixture, and what it did kept when its test fails.
+
+::
+
+    @pytest.mark.uno(firmware="blink.hex")
+    def test_blinks(uno):
+        uno.run(seconds=1)
+        assert len(uno.edges("D13")) == 2
+
+The emulator is imported when a fixture asks for it, so that the plugin costs other test runs nothing.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Generator
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+if TYPE_CHECKING:
+    from planarm_sim.board import Uno
+
+__all__ = ["Artefacts", "artefacts_of", "make_uno", "uno"]
+
+MARKER = (
+    "uno(firmware=FILE, **settings): the program of the fixture `uno`, Intel HEX or ELF, relative to the test's file "
+    "or to the root directory; settings as Uno.from_file takes them (baud=, bootloader=, ...)"
+)
+
+
+class Artefacts:
+    """What the fixtures of one test can tell when it fails: files, written into a folder of the test's own.
+
+    Attributes:
+        writers: by file name, who writes it.
+    """
+
+    def __init__(self) -> None:
+        self.writers: dict[str, Callable[[Path], None]] = {}
+
+    def add(self, name: str, write: Callable[[Path], None]) -> None:
+        """Have `write` called with the path of the file `name` should the test fail."""
+        self.writers[name] = write
+
+    def keep(self, folder: Path) -> list[str]:
+        """Write all of them; returns their names."""
+        if self.writers:
+            folder.mkdir(parents=True, exist_ok=True)
+        for name, write in self.writers.items():
+            write(folder / name)
+        return list(self.writers)
+
+
+_ARTEFACTS = pytest.StashKey[Artefacts]()
+
+
+def artefacts_of(node: pytest.Item) -> Artefacts:
+    """The artefacts of a test; other fixtures that emulate add theirs here."""
+    return node.stash.setdefault(_ARTEFACTS, Artefacts())
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """Add the options that choose program and folder."""
+    group = parser.getgroup("uno", "emulated Arduino Uno")
+    group.addoption("--uno-firmware", metavar="FILE", help="program of the fixture `uno` for tests that name none")
+    group.addoption("--uno-artefacts", metavar="DIR", help="where the boards of failed tests leave what they did")
+    parser.addini("uno_firmware", "program of the fixture `uno` for tests that name none", default="")
+    parser.addini("uno_artefacts", "where the boards of failed tests leave what they did", default="uno-artefacts")
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Tell pytest of the marker."""
+    config.addinivalue_line("markers", MARKER)
+
+
+@pytest.fixture
+def make_uno(request: pytest.FixtureRequest) -> Callable[..., Uno]:
+    """A factory of boards: `make_uno("blink.hex", baud=9600)`; without a program, the one of marker or option."""
+    artefacts = artefacts_of(request.node)
+    made: list[Uno] = []
+
+    def make(firmware: str | Path | None = None, **settings: Any) -> Uno:  # noqa: ANN401 - they are Uno.from_file's
+        from planarm_sim.board import Uno  # noqa: PLC0415 - see the module's text
+
+        chosen, defaults = _program_of(request)
+        board = Uno.from_file(_found(firmware or chosen, request), **{**defaults, **settings})
+        made.append(board)
+        _keep_what_it_does(board, artefacts, "" if len(made) == 1 else f"-{len(made)}")
+        return board
+
+    return make
+
+
+@pytest.fixture
+def uno(make_uno: Callable[..., Uno]) -> Uno:
+    """An emulated Uno at power-up, with the program of the marker `uno`, of --uno-firmware, or of `uno_firmware`."""
+    return make_uno()
+
+
+def _program_of(request: pytest.FixtureRequest) -> tuple[str, dict[str, Any]]:
+    marker = request.node.get_closest_marker("uno")
+    settings = dict(marker.kwargs) if marker is not None else {}
+    firmware = settings.pop("firmware", None)
+    if firmware is None:
+        firmware = request.config.getoption("--uno-firmware") or request.config.getini("uno_firmware")
+    return str(firmware or ""), settings
+
+
+def _found(firmware: str | Path, request: pytest.FixtureRequest) -> Path:
+    """The program's path: as it is, beside the test's file, or below the root directory."""
+    if not str(firmware):
+        raise pytest.UsageError(
+            f"{request.node.nodeid} asks for an Uno, and nothing says what it runs: mark the test with "
+            "@pytest.mark.uno(firmware=FILE), or give --uno-firmware FILE, or set uno_firmware in the configuration"
+        )
+    places = [request.path.parent / firmware, request.config.rootpath / firmware, Path(firmware)]
+    return next((place for place in places if place.exists()), Path(firmware))
+
+
+def _keep_what_it_does(board: Uno, artefacts: Artefacts, suffix: str) -> None:
+    from planarm_sim.emulate import TRACED_PINS  # noqa: PLC0415 - see the module's text
+    from planarm_sim.trace import write_serial_log  # noqa: PLC0415
+
+    artefacts.add(f"pins{suffix}.vcd", lambda path: board.write_vcd(path, TRACED_PINS))
+    artefacts.add(f"serial{suffix}.csv", lambda path: write_serial_log(path, board.serial.log))
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_makereport(
+    item: pytest.Item, call: pytest.CallInfo[None]
+) -> Generator[None, pytest.TestReport, pytest.TestReport]:
+    """Keep what the boards of a failed test did, and tell in its report where."""
+    report = yield
+    artefacts = item.stash.get(_ARTEFACTS, None)
+    if report.failed and call.when != "teardown" and artefacts is not None:
+        folder = _folder_of(item)
+        if names := artefacts.keep(folder):
+            report.sections.append(("emulated Uno", f"{', '.join(names)} kept in {folder}"))
+    return report
+
+
+def _folder_of(item: pytest.Item) -> Path:
+    config = item.config
+    chosen = config.getoption("--uno-artefacts") or config.getini("uno_artefacts")
+    top = Path(chosen)
+    if not top.is_absolute():
+        top = (config.invocation_params.dir if config.getoption("--uno-artefacts") else config.rootpath) / top
+    return top / re.sub(r"[^\w.-]+", "_", item.nodeid).strip("_")
