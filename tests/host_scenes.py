@@ -7,7 +7,17 @@ import shapely
 
 from planarm.model.kinematics import forward
 from planarm.model.shapes import Circle, Polygon, shape_of
-from planarm.scene import ArmSpec, JointSpec, LinkSpec, Obstacle, PlannerSpec, Scene, TaskSpec, WorkspaceSpec
+from planarm.scene import (
+    ArmSpec,
+    JointSpec,
+    LinkSpec,
+    MechanicsSpec,
+    Obstacle,
+    PlannerSpec,
+    Scene,
+    TaskSpec,
+    WorkspaceSpec,
+)
 
 FULL_TURN = ((radians(-90), radians(270)), (-pi, pi))
 
@@ -39,6 +49,8 @@ def make_scene(
         planner=PlannerSpec("chs", 56, "run", 1, "proved"),
         joints=(joint, joint),
         link=LinkSpec("sim://", 250_000),
+        mechanics=MechanicsSpec.usual(links),
+        coupling=((1.0, 0.0), (0.0, 1.0)),
     )
 
 

@@ -61,7 +61,7 @@ def plan_scene(scene: Scene, notice: Notice) -> Plan:
             "most; raise joints.max_speed_deg_s or joints.max_acceleration_deg_s2, or move task.goal_cm nearer"
         )
     notice("plan", 0.6)
-    train = quantise(trajectory, scene.joints)
+    train = quantise(trajectory, scene.joints, scene.coupling)
     segments = compress(train)
     notice("plan", 0.8)
     certificate = certify(scene, trajectory, train, segments)
@@ -88,7 +88,7 @@ def shortest_path(scene: Scene) -> tuple[FreeMap, TipPath, float]:
     Raises:
         SceneError, NoPathError: no side has a path; the first side's reason.
     """
-    margin_cm = scene.margin_cm + quantisation_bound_cm(Arm.from_spec(scene.arm), scene.joints)
+    margin_cm = scene.margin_cm + quantisation_bound_cm(Arm.from_spec(scene.arm), scene.joints, scene.coupling)
     found: list[tuple[FreeMap, TipPath, float]] = []
     problems: list[SceneError | NoPathError] = []
     for side in elbow_sides(scene.arm):

@@ -9,6 +9,7 @@ import numpy as np
 from planarm.link.position import moved_usteps
 from planarm.model.arm import Arm
 from planarm.model.kinematics import forward, tip_jacobian
+from planarm.model.transmission import Transmission
 from planarm_wire.messages import TICKS_HZ
 
 if TYPE_CHECKING:
@@ -52,13 +53,13 @@ def summarise(plan: Plan, streamed: StreamResult, findings: Findings | None) -> 
 def tip_figures(plan: Plan, net_usteps: tuple[int, ...]) -> dict[str, float]:
     """Return how far the end effector stands from the goal, and how far half a micro-step a joint can put it."""
     arm = Arm.from_spec(plan.scene.arm)
-    usteps_per_rad = np.array([joint.usteps_per_rad for joint in plan.scene.joints])
-    q_rad = (np.array(plan.segments.start_usteps) + np.array(net_usteps)) / usteps_per_rad
+    transmission = Transmission.of(plan.scene)
+    q_rad = transmission.q_rad(np.array(plan.segments.start_usteps) + np.array(net_usteps))
     goal_cm = np.array(plan.scene.task.goal_cm)
-    levers_cm = np.hypot(*tip_jacobian(arm, q_rad))
+    half_steps_cm = np.hypot(*(tip_jacobian(arm, q_rad) @ (0.5 * transmission.rad_per_ustep)))
     return {
         "tip_error_mm": round(10.0 * float(np.hypot(*(forward(arm, q_rad)[-1] - goal_cm))), 6),
-        "tip_bound_mm": round(10.0 * float((0.5 / usteps_per_rad * levers_cm).sum()), 6),
+        "tip_bound_mm": round(10.0 * float(half_steps_cm.sum()), 6),
     }
 
 

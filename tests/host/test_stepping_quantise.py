@@ -12,7 +12,7 @@ from planarm.errors import TimingError
 from planarm.model.arm import Arm
 from planarm.model.kinematics import forward
 from planarm.stepping.quantise import hysteresis_usteps, quantisation_bound_cm, quantise
-from planarm.stepping.train import MIN_REVERSAL_TICKS, JointSteps, StepTrain, require_steppable, to_usteps
+from planarm.stepping.train import MIN_REVERSAL_TICKS, JointSteps, StepTrain, nearest_usteps, require_steppable
 from planarm.trajectory.motion import Trajectory
 from planarm.trajectory.timing import time_path
 
@@ -141,7 +141,7 @@ def test_a_start_on_the_edge_of_a_micro_step_waits_for_the_dir_line():
 
 
 def test_half_way_values_go_up():
-    assert to_usteps([0.5, -0.5, 1.49, -1.51], 1.0).tolist() == [1, 0, 1, -2]
+    assert nearest_usteps([0.5, -0.5, 1.49, -1.51]).tolist() == [1, 0, 1, -2]
 
 
 @pytest.mark.parametrize(

@@ -5,6 +5,8 @@ centimetres and radians. docs/scene.md is the reference of the format.
 """
 
 from planarm.scene.load import load_scene, parse_scene, with_planner
+from planarm.scene.mechanics import Matrix, MechanicsSpec
+from planarm.scene.motor import MotorSpec
 from planarm.scene.types import (
     Algorithm,
     ArmSpec,
@@ -29,6 +31,9 @@ __all__ = [
     "Elbow",
     "JointSpec",
     "LinkSpec",
+    "Matrix",
+    "MechanicsSpec",
+    "MotorSpec",
     "Moves",
     "Obstacle",
     "PlannerSpec",

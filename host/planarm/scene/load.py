@@ -6,6 +6,9 @@ from math import radians
 from pathlib import Path
 
 from planarm.errors import SceneError
+from planarm.scene.mechanics import MECHANICS_KEYS, TRANSMISSION_KEYS, parse_coupling, parse_mechanics
+from planarm.scene.motor import KEYS as MOTOR_KEYS
+from planarm.scene.motor import parse_motor
 from planarm.scene.simple_polygon import polygon_problem
 from planarm.scene.strict_toml import Table
 from planarm.scene.types import (
@@ -25,21 +28,31 @@ from planarm.scene.types import (
     WorkspaceSpec,
 )
 
-ROOT_KEYS = ("name", "arm", "workspace", "obstacles", "task", "planner", "joints", "link")
+ROOT_KEYS = ("name", "arm", "workspace", "obstacles", "task", "planner", "joints", "link", "mechanics", "transmission")
 ARM_KEYS = ("link_lengths_cm", "link_width_cm", "base_cm", "elbow", "joint_limits_deg", "floor")
 WORKSPACE_KEYS = ("x_cm", "y_cm", "cell_cm", "clearance_cm")
 ROUND_KEYS = ("shape", "center_cm", "diameter_cm")
 POLYGON_KEYS = ("shape", "vertices_cm")
 TASK_KEYS = ("start_cm", "goal_cm")
 PLANNER_KEYS = ("algorithm", "neighbours", "subset", "seed", "moves")
-JOINT_KEYS = ("steps_per_rev", "microsteps", "gear_ratio", "driver", "max_speed_deg_s", "max_acceleration_deg_s2")
+JOINT_KEYS = (
+    "steps_per_rev",
+    "microsteps",
+    "gear_ratio",
+    "driver",
+    "max_speed_deg_s",
+    "max_acceleration_deg_s2",
+    "reversed",
+    "zero_offset_deg",
+    "motor",
+)
 LINK_KEYS = ("port", "baud")
 
 ELBOWS: tuple[Elbow, ...] = ("up", "down", "either")
 SHAPES: tuple[Shape, ...] = ("circle", "square", "diamond", "triangle", "hexagon", "polygon")
 SUBSETS: tuple[Subset, ...] = ("run", "expansion")
 MOVES: tuple[Moves, ...] = ("proved", "nodes")
-DRIVERS = ("a4988", "drv8825", "tmc2209", "dm542")
+DRIVERS = ("a4988", "drv8825", "tmc2208", "tmc2209", "dm542", "tb6600")
 NEIGHBOURS: dict[Algorithm, tuple[int, ...]] = {
     "a_star": (8,),
     "modified_a_star": (24, 48),
@@ -86,16 +99,19 @@ def parse_scene(text: str, source: str) -> Scene:
         raise SceneError(source, "", f"is not valid TOML: {problem}") from problem
     root = Table.with_keys(source, "", data, ROOT_KEYS)
     workspace = _workspace(root.table("workspace", WORKSPACE_KEYS))
+    arm = _arm(root.table("arm", ARM_KEYS))
     return Scene(
         name=root.text("name", Path(source).stem or source),
         source=source,
-        arm=_arm(root.table("arm", ARM_KEYS)),
+        arm=arm,
         workspace=workspace,
         obstacles=tuple(_obstacle(source, path, entry) for path, entry in root.tables("obstacles")),
         task=_task(root.table("task", TASK_KEYS), workspace),
         planner=_planner(root.table("planner", PLANNER_KEYS, optional=True)),
         joints=_joints(root),
         link=_link(root.table("link", LINK_KEYS, optional=True)),
+        mechanics=parse_mechanics(root.table("mechanics", MECHANICS_KEYS, optional=True), arm.link_lengths_cm),
+        coupling=parse_coupling(root.table("transmission", TRANSMISSION_KEYS, optional=True), LINKS),
     )
 
 
@@ -230,6 +246,9 @@ def _joint(table: Table) -> JointSpec:
         driver=table.choice("driver", DRIVERS, "a4988"),
         max_speed_rad_s=radians(table.number("max_speed_deg_s", above=0.0, at_most=1e6)),
         max_acceleration_rad_s2=radians(table.number("max_acceleration_deg_s2", above=0.0, at_most=1e6)),
+        reversed=table.flag("reversed", False),
+        zero_offset_rad=radians(table.number("zero_offset_deg", 0.0, at_least=-720.0, at_most=720.0)),
+        motor=parse_motor(table.table("motor", MOTOR_KEYS, optional=True)),
     )
 
 

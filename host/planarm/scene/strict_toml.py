@@ -18,10 +18,37 @@ UNITS = {
     "deg": "degrees",
     "deg_s": "degrees per second",
     "deg_s2": "degrees per second squared",
+    "kg": "kilograms",
+    "kg_m2": "kilogram square metres",
+    "g_cm2": "gram square centimetres",
+    "nm": "newton metres",
+    "nm_s": "newton metres for 1 rad/s",
+    "nm_rad": "newton metres for 1 rad",
+    "a": "amperes",
+    "v": "volts",
+    "ohm": "ohms",
+    "mh": "millihenries",
 }
 """The unit suffixes that keys of a scene end in."""
 
-OTHER_UNITS = ("mm", "m", "in", "inch", "rad", "rad_s", "rad_s2", "rev_s", "rpm", "turns", *UNITS)
+OTHER_UNITS = (
+    "mm",
+    "m",
+    "in",
+    "inch",
+    "rad",
+    "rad_s",
+    "rad_s2",
+    "rev_s",
+    "rpm",
+    "turns",
+    "g",
+    "ncm",
+    "ma",
+    "h",
+    "uh",
+    *UNITS,
+)
 """Suffixes that tell a key with the wrong unit from a key with the wrong name."""
 
 

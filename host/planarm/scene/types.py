@@ -1,8 +1,11 @@
 """What a scene says, as frozen dataclasses in centimetres and radians."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from math import ceil, floor, pi
 from typing import Literal
+
+from planarm.scene.mechanics import Matrix, MechanicsSpec
+from planarm.scene.motor import MotorSpec
 
 Elbow = Literal["up", "down", "either"]
 Shape = Literal["circle", "square", "diamond", "triangle", "hexagon", "polygon"]
@@ -88,7 +91,11 @@ class PlannerSpec:
 
 @dataclass(frozen=True, slots=True)
 class JointSpec:
-    """A joint's stepper motor, gear and limits."""
+    """A joint's stepper motor, gear and limits.
+
+    `reversed` is True when the motor's positive sense turns the joint clockwise; `zero_offset_rad` is the joint's angle
+    when all motors stand at micro-step 0.
+    """
 
     steps_per_rev: int
     microsteps: int
@@ -96,10 +103,13 @@ class JointSpec:
     driver: str
     max_speed_rad_s: float
     max_acceleration_rad_s2: float
+    reversed: bool = False
+    zero_offset_rad: float = 0.0
+    motor: MotorSpec = field(default_factory=MotorSpec)
 
     @property
     def usteps_per_rad(self) -> float:
-        """Micro-steps of the motor for one radian of the joint."""
+        """Micro-steps of the motor for one radian behind its gear, whatever the sense."""
         return self.steps_per_rev * self.microsteps * self.gear_ratio / (2.0 * pi)
 
 
@@ -124,6 +134,9 @@ class Scene:
     planner: PlannerSpec
     joints: tuple[JointSpec, ...]
     link: LinkSpec
+    mechanics: MechanicsSpec
+    coupling: Matrix
+    """Row m says how far motor m turns, behind its gear, when each joint turns once."""
 
     @property
     def margin_cm(self) -> float:

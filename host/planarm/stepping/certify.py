@@ -4,6 +4,7 @@ The segments are expanded again in plain integers; limits, gaps, counts, times a
 those steps. `streaming` takes no plan whose certificate is not `ok`.
 """
 
+from planarm.model.transmission import motor_axes
 from planarm.scene import Scene
 from planarm.stepping.certificate import Certificate, Check
 from planarm.stepping.check_motion import check_deviation, check_limits
@@ -27,11 +28,12 @@ def certify(scene: Scene, trajectory: Trajectory, train: StepTrain, plan: Segmen
         plan: the segments to be streamed; everything is held against what they expand to.
     """
     made = expand(plan)
+    axes = motor_axes(scene.joints, scene.coupling)
     checks = check_wire(plan)
     for number in range(1, len(scene.joints) + 1):
         checks += check_counts(train, made, number)
-        checks += check_gaps(made, scene.joints, number)
+        checks += check_gaps(made, axes, number)
     checks += check_limits(trajectory, scene.joints)
-    checks += check_deviation(trajectory, made, scene.joints)
+    checks += check_deviation(trajectory, made, scene.joints, scene.coupling)
     checks += check_space(scene, made)
     return Certificate(tuple(checks))

@@ -6,7 +6,8 @@ asked.
 
 import numpy as np
 
-from planarm.scene import JointSpec
+from planarm.model.transmission import Transmission, motor_axes
+from planarm.scene import JointSpec, Matrix
 from planarm.stepping.certificate import Check, at_most
 from planarm.stepping.quantise import TIMING_USTEPS, hysteresis_usteps
 from planarm.stepping.train import Floats, StepTrain
@@ -44,20 +45,23 @@ def check_limits(trajectory: Trajectory, joints: tuple[JointSpec, ...]) -> list[
     return checks
 
 
-def check_deviation(trajectory: Trajectory, made: StepTrain, joints: tuple[JointSpec, ...]) -> list[Check]:
-    """Check how far each joint's steps are from the planned angle: before and after every step, and at both ends."""
+def check_deviation(
+    trajectory: Trajectory, made: StepTrain, joints: tuple[JointSpec, ...], coupling: Matrix | None = None
+) -> list[Check]:
+    """Check how far each motor's steps are from the planned angle: before and after every step, and at both ends."""
+    transmission = Transmission.from_joints(joints, coupling)
     end_tick = np.array([0, made.duration_ticks])
     checks = []
-    for number, (joint, steps) in enumerate(zip(joints, made.steps, strict=True), start=1):
+    for number, (axis, steps) in enumerate(zip(motor_axes(joints, coupling), made.steps, strict=True), start=1):
         start = made.start_usteps[number - 1]
         after = start + np.cumsum(steps.directions, dtype=np.int64)
         final = int(after[-1]) if len(after) else start
         ticks = np.concatenate([steps.ticks, steps.ticks, end_tick])
         positions = np.concatenate([after, after - steps.directions, [start, final]])
-        planned = trajectory.sample(ticks / TICKS_HZ)[0][:, number - 1] * joint.usteps_per_rad
+        planned = transmission.usteps(trajectory.sample(ticks / TICKS_HZ)[0])[:, number - 1]
         deviation: Floats = np.abs(positions - planned)
         worst = int(np.argmax(deviation))
-        allowed = 0.5 + TIMING_USTEPS + hysteresis_usteps(joint)
+        allowed = 0.5 + TIMING_USTEPS + hysteresis_usteps(axis)
         where = f"{ticks[worst] / TICKS_HZ:.6f} s"
         checks.append(at_most(f"joint {number} deviation from the plan", deviation[worst], allowed, "usteps", where))
     return checks

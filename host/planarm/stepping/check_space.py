@@ -11,7 +11,8 @@ from itertools import pairwise
 import numpy as np
 
 from planarm.model.shapes import shape_of
-from planarm.scene import JointSpec, Scene
+from planarm.model.transmission import Transmission
+from planarm.scene import Scene
 from planarm.stepping.certificate import Check, Verdict, at_least, at_most
 from planarm.stepping.clearance import joint_positions_cm, link_clearance_cm
 from planarm.stepping.train import Floats, StepTrain, Ticks
@@ -48,7 +49,7 @@ def check_space(scene: Scene, made: StepTrain) -> list[Check]:
         ("goal", -1, scene.task.goal_cm, "goal"),
     ):
         tip = positions[-1][index]
-        bound = float(_half_step_cm(scene.arm.link_lengths_cm, scene.joints).sum())
+        bound = float(_half_step_cm(scene).sum())
         error = float(np.hypot(*(tip - wanted)))
         where = f"tip ({tip[0]:.4f}, {tip[1]:.4f}) cm"
         setting = f"task.{key}_cm or joints.microsteps"
@@ -56,16 +57,15 @@ def check_space(scene: Scene, made: StepTrain) -> list[Check]:
     return checks
 
 
-def _half_step_cm(link_lengths_cm: tuple[float, ...], joints: tuple[JointSpec, ...]) -> Floats:
-    """Return how far half a micro-step of each joint can move a point of the arm: its lever is all links beyond it."""
-    levers_cm = np.cumsum(link_lengths_cm[::-1])[::-1]
-    return np.array([0.5 / joint.usteps_per_rad * lever for joint, lever in zip(joints, levers_cm, strict=True)])
+def _half_step_cm(scene: Scene) -> Floats:
+    """Return how far half a micro-step of each motor can move a point of the arm."""
+    return 0.5 * Transmission.of(scene).levers_cm(scene.arm.link_lengths_cm)
 
 
 def _poses(scene: Scene, made: StepTrain) -> _Poses:
     """Return the poses of the whole motion in the order of time."""
     ticks = np.unique(np.concatenate([steps.ticks for steps in made.steps]))
-    half_step_cm = _half_step_cm(scene.arm.link_lengths_cm, scene.joints)
+    half_step_cm = _half_step_cm(scene)
     middles = np.empty((len(ticks) + 2, len(scene.joints)))
     reach_cm = np.zeros(len(ticks) + 2)
     for j, (steps, start) in enumerate(zip(made.steps, made.start_usteps, strict=True)):
@@ -74,7 +74,7 @@ def _poses(scene: Scene, made: StepTrain) -> _Poses:
         after = positions[np.searchsorted(steps.ticks, ticks, side="right")]
         middles[:, j] = np.concatenate([[start], 0.5 * (before + after), positions[-1:]])
         reach_cm[1:-1] += np.abs(after - before) * half_step_cm[j]
-    q_rad = middles / np.array([joint.usteps_per_rad for joint in scene.joints])
+    q_rad = Transmission.of(scene).q_rad(middles)
     return _Poses(np.concatenate([[0], ticks, [made.duration_ticks]]), q_rad, reach_cm)
 
 
@@ -97,20 +97,27 @@ def _check_clearance(scene: Scene, poses: _Poses, positions: list[Floats]) -> Ch
 def _check_joint_limits(scene: Scene, made: StepTrain) -> list[Check]:
     """Check every pose against the joint limits; within half a micro-step beyond a limit is amber: it is rounding."""
     checks = []
-    limits = scene.arm.joint_limits_rad
-    for number, (joint, steps) in enumerate(zip(scene.joints, made.steps, strict=True), start=1):
-        start, (low, high) = made.start_usteps[number - 1], limits[number - 1]
-        positions = np.concatenate([[start], start + np.cumsum(steps.directions, dtype=np.int64)])
-        q_rad = positions / joint.usteps_per_rad
-        room = np.minimum(q_rad - low, high - q_rad)
+    transmission = Transmission.of(scene)
+    ticks = np.unique(np.concatenate([[0], *(steps.ticks for steps in made.steps)]))
+    q_rad = transmission.q_rad(np.column_stack([_positions_after(made, m, ticks) for m in range(len(scene.joints))]))
+    for number, (low, high) in enumerate(scene.arm.joint_limits_rad, start=1):
+        angles = q_rad[:, number - 1]
+        room = np.minimum(angles - low, high - angles)
         worst = int(np.argmin(room))
-        tick = 0 if worst == 0 else int(steps.ticks[worst - 1])
-        beyond = -room[worst] * joint.usteps_per_rad
-        verdict: Verdict = "green" if beyond <= 0.0 else "amber" if beyond <= 0.5 + 1e-6 else "red"
-        where = f"{tick / TICKS_HZ:.6f} s, {np.degrees(q_rad[worst]):.4f} deg"
+        rounding_rad = 0.5 * float(np.abs(transmission.rad_per_ustep[number - 1]).sum())
+        beyond = -room[worst] / rounding_rad
+        verdict: Verdict = "green" if beyond <= 0.0 else "amber" if beyond <= 1.0 + 1e-6 else "red"
+        where = f"{ticks[worst] / TICKS_HZ:.6f} s, {np.degrees(angles[worst]):.4f} deg"
         name = f"joint {number} distance to its limits"
         checks.append(Check(name, float(room[worst]), 0.0, "rad", verdict, where, f"arm.joint_limits_deg[{number}]"))
     return checks
+
+
+def _positions_after(made: StepTrain, m: int, ticks: Ticks) -> Ticks:
+    """Return where motor m, from 0, stands after its steps up to each tick."""
+    steps, start = made.steps[m], made.start_usteps[m]
+    positions: Ticks = np.concatenate([[start], start + np.cumsum(steps.directions, dtype=np.int64)])
+    return positions[np.searchsorted(steps.ticks, ticks, side="right")]
 
 
 def _where(poses: _Poses, positions: list[Floats], i: int) -> str:

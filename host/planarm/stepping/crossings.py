@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from planarm.errors import TimingError
+from planarm.model.transmission import Transmission
 from planarm.stepping.train import Directions, Floats
 from planarm.trajectory.joint_path import JointPath
 
@@ -47,18 +48,20 @@ class _Pieces:
     rate_high: Floats
 
 
-def find_crossings(path: JointPath, grid_s: Floats, usteps_per_rad: Floats) -> Crossings:
+def find_crossings(path: JointPath, grid_s: Floats, transmission: Transmission) -> Crossings:
     """Return every crossing of every motor.
 
     Args:
         path: the joints' path.
         grid_s: where to look for turning points in between, ascending, with all borders of the path's pieces.
-        usteps_per_rad: micro-steps of each motor by radians of each joint, shape (motors, joints).
+        transmission: which motor moves which joint.
 
     Raises:
         TimingError: a crossing cannot be located; the path is not smooth where it should be.
     """
-    pieces = _monotone_pieces(path, grid_s, usteps_per_rad)
+    usteps_per_rad = transmission.usteps_per_rad
+    zero_usteps = usteps_per_rad @ transmission.zero_rad
+    pieces = _monotone_pieces(path, grid_s, usteps_per_rad, zero_usteps)
     low, high = np.floor(pieces.x_low + 0.5), np.floor(pieces.x_high + 0.5)
     crossed = np.abs(high - low).astype(np.int64)
     piece = np.repeat(np.arange(len(crossed)), crossed)
@@ -67,18 +70,19 @@ def find_crossings(path: JointPath, grid_s: Floats, usteps_per_rad: Floats) -> C
     middles = low[piece] + direction * (nth + 0.5)
     guess = _cubic_guess(pieces, piece, middles)
     motor = pieces.motor[piece]
-    s = _located(path, usteps_per_rad[motor], middles, direction, (guess, pieces.s_low[piece], pieces.s_high[piece]))
+    bracket = guess, pieces.s_low[piece], pieces.s_high[piece]
+    s = _located(path, usteps_per_rad[motor], middles + zero_usteps[motor], direction, bracket)
     return Crossings(motor, s, direction.astype(np.int8))
 
 
-def _monotone_pieces(path: JointPath, s: Floats, usteps_per_rad: Floats) -> _Pieces:
+def _monotone_pieces(path: JointPath, s: Floats, usteps_per_rad: Floats, zero_usteps: Floats) -> _Pieces:
     """Cut the grid's intervals at turning points, motor by motor."""
     right, left = path.evaluate(s[:-1], "right"), path.evaluate(s[1:], "left")
-    x_low, x_high = right.q_rad @ usteps_per_rad.T, left.q_rad @ usteps_per_rad.T
+    x_low, x_high = (side.q_rad @ usteps_per_rad.T - zero_usteps for side in (right, left))
     rate_low, rate_high = right.dq_rad @ usteps_per_rad.T, left.dq_rad @ usteps_per_rad.T
     motor, turning = np.nonzero((rate_low * rate_high < 0.0).T)
     roots = _turning_points(path, usteps_per_rad[motor], s[turning], s[turning + 1], rate_low[turning, motor])
-    x_turn = np.einsum("ij,ij->i", path.evaluate(roots).q_rad, usteps_per_rad[motor])
+    x_turn = np.einsum("ij,ij->i", path.evaluate(roots).q_rad, usteps_per_rad[motor]) - zero_usteps[motor]
     intervals, motors = x_low.shape
     after = motor * intervals + turning + 1
     still = np.zeros(len(roots))

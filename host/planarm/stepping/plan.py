@@ -12,7 +12,7 @@ class SegmentPlan:
     Attributes:
         segments: in order; the last one is flagged. Empty when nothing moves.
         duration_ticks: sum of the segments' durations.
-        start_usteps: each joint's position before the motion; a joint stands at usteps / usteps_per_rad.
+        start_usteps: each motor's position before the motion; `model.transmission` says where that puts the joints.
     """
 
     segments: tuple[Segment, ...]

@@ -1,4 +1,4 @@
-"""Trajectory to steps: a step is made where the joint's angle crosses the middle between two micro-steps.
+"""Trajectory to steps: a step is made where a motor's angle crosses the middle between two micro-steps.
 
 So the arm always stands on the micro-step nearest to the planned angle. The crossings are found on the path, where they
 do not depend on time (`planarm.stepping.crossings`); the time at which the trajectory passes s is known in closed form.
@@ -15,7 +15,8 @@ import numpy as np
 
 from planarm.errors import TimingError
 from planarm.model.arm import Arm
-from planarm.scene import JointSpec
+from planarm.model.transmission import Transmission
+from planarm.scene import JointSpec, Matrix
 from planarm.stepping.crossings import find_crossings
 from planarm.stepping.train import (
     LARGEST_RATE_HZ,
@@ -25,9 +26,9 @@ from planarm.stepping.train import (
     JointSteps,
     StepTrain,
     Ticks,
+    nearest_usteps,
     require_steppable,
     slower,
-    to_usteps,
 )
 from planarm.trajectory.motion import Trajectory
 from planarm_wire.messages import MIN_DIR_SETUP_TICKS, TICKS_HZ
@@ -42,18 +43,17 @@ SUBDIVISION = 4
 """Parts of each interval of the trajectory in which the angles are searched for turning points."""
 
 
-def quantise(trajectory: Trajectory, joints: Sequence[JointSpec]) -> StepTrain:
-    """Return every step of the motion on its tick.
+def quantise(trajectory: Trajectory, joints: Sequence[JointSpec], coupling: Matrix | None = None) -> StepTrain:
+    """Return every step of the motion on its tick, one entry a motor.
 
     Raises:
         TimingError: a joint would have to step faster than the firmware can.
     """
-    usteps_per_rad = np.array([joint.usteps_per_rad for joint in joints])
-    _require_possible_rates(trajectory, joints, usteps_per_rad)
-    start = to_usteps(trajectory.q_rad[0], usteps_per_rad)
+    transmission = Transmission.from_joints(joints, coupling)
+    _require_possible_rates(trajectory, joints, transmission)
+    start = nearest_usteps(transmission.usteps(trajectory.q_rad[0]))
     steps = tuple(
-        JointSteps(*_without_flutter(ticks, directions))
-        for ticks, directions in _steps_of(trajectory, np.diag(usteps_per_rad))
+        JointSteps(*_without_flutter(ticks, directions)) for ticks, directions in _steps_of(trajectory, transmission)
     )
     last = max((int(joint.ticks[-1]) for joint in steps if len(joint.ticks)), default=-1)
     duration = max(int(np.floor(trajectory.duration_s * TICKS_HZ + 0.5)), last + 1)
@@ -62,12 +62,12 @@ def quantise(trajectory: Trajectory, joints: Sequence[JointSpec]) -> StepTrain:
     return train
 
 
-def _require_possible_rates(trajectory: Trajectory, joints: Sequence[JointSpec], usteps_per_rad: Floats) -> None:
+def _require_possible_rates(trajectory: Trajectory, joints: Sequence[JointSpec], transmission: Transmission) -> None:
     """Refuse a motion far beyond the firmware's rate before its steps, perhaps millions, are located.
 
     The exact verdict is that of `require_steppable`; gridpoints alone show only what is twice too fast or more.
     """
-    rates_hz = np.abs(trajectory.sample(trajectory.t_s)[1]) * usteps_per_rad
+    rates_hz = np.abs(transmission.rates(trajectory.sample(trajectory.t_s)[1]))
     point, j = np.unravel_index(int(rates_hz.argmax()), rates_hz.shape)
     if rates_hz[point, j] > 2.0 * LARGEST_RATE_HZ:
         raise TimingError(
@@ -76,19 +76,17 @@ def _require_possible_rates(trajectory: Trajectory, joints: Sequence[JointSpec],
         )
 
 
-def quantisation_bound_cm(arm: Arm, joints: Sequence[JointSpec]) -> float:
+def quantisation_bound_cm(arm: Arm, joints: Sequence[JointSpec], coupling: Matrix | None = None) -> float:
     """Return how far any point of the arm can be from where the trajectory has it, while it makes the steps.
 
-    Half a micro-step and the steps' timing tolerance in each joint, at the joint's lever: all links from it outwards.
+    Half a micro-step and the steps' timing tolerance of each motor, at its lever.
     """
-    levers_cm = np.cumsum(arm.link_lengths_cm[::-1])[::-1]
-    return float(
-        sum((0.5 + TIMING_USTEPS) / joint.usteps_per_rad * r for joint, r in zip(joints, levers_cm, strict=True))
-    )
+    levers_cm = Transmission.from_joints(joints, coupling).levers_cm(arm.link_lengths_cm)
+    return float((0.5 + TIMING_USTEPS) * levers_cm.sum())
 
 
 def hysteresis_usteps(joint: JointSpec) -> float:
-    """Return how far beyond half a micro-step the joint can be when a pair of steps is left out.
+    """Return how far beyond half a micro-step a motor's axis can be when a pair of steps is left out.
 
     The angle turns back within MIN_REVERSAL_TICKS, so it gets no farther than half that time at full acceleration; a
     delayed first step is half as late and adds no more.
@@ -97,12 +95,12 @@ def hysteresis_usteps(joint: JointSpec) -> float:
     return 0.5 * joint.max_acceleration_rad_s2 * joint.usteps_per_rad * half_s**2
 
 
-def _steps_of(trajectory: Trajectory, usteps_per_rad: Floats) -> list[tuple[Ticks, Directions]]:
-    """Return ticks and directions of each motor's steps; `usteps_per_rad` has a row for each motor, by joint."""
-    motors = len(usteps_per_rad)
+def _steps_of(trajectory: Trajectory, transmission: Transmission) -> list[tuple[Ticks, Directions]]:
+    """Return ticks and directions of each motor's steps."""
+    motors = len(transmission.usteps_per_rad)
     if len(trajectory.s) == 1:
         return [(np.zeros(0, np.int64), np.zeros(0, np.int8))] * motors
-    found = find_crossings(trajectory.path, _fine_grid(trajectory.s), usteps_per_rad)
+    found = find_crossings(trajectory.path, _fine_grid(trajectory.s), transmission)
     ticks = np.floor(trajectory.time_at(found.s) * TICKS_HZ + 0.5).astype(np.int64)
     ends = np.searchsorted(found.motor, np.arange(motors + 1))
     steps = []

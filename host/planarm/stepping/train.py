@@ -44,8 +44,8 @@ class StepTrain:
     """The steps of all joints over one motion.
 
     Attributes:
-        start_usteps: each joint's position before the motion; a joint stands at usteps / usteps_per_rad.
-        steps: one entry a joint.
+        start_usteps: each motor's position before the motion; `model.transmission` says where that puts the joints.
+        steps: one entry a motor.
         duration_ticks: length of the motion, later than every step; 0 when nothing moves.
     """
 
@@ -59,9 +59,9 @@ class StepTrain:
         return tuple(start + joint.net_usteps for start, joint in zip(self.start_usteps, self.steps, strict=True))
 
 
-def to_usteps(q_rad: ArrayLike, usteps_per_rad: ArrayLike) -> NDArray[np.int64]:
-    """Return the nearest micro-step of each joint angle; half-way values go up."""
-    nearest: NDArray[np.int64] = np.floor(np.asarray(q_rad) * np.asarray(usteps_per_rad) + 0.5).astype(np.int64)
+def nearest_usteps(usteps: ArrayLike) -> NDArray[np.int64]:
+    """Return the nearest whole micro-steps; half-way values go up."""
+    nearest: NDArray[np.int64] = np.floor(np.asarray(usteps) + 0.5).astype(np.int64)
     return nearest
 
 
