@@ -106,6 +106,8 @@ ALLOWED: dict[str, set[str]] = {
         "planarm.model",
         "planarm.workspace",
         "planarm.search",
+        "planarm.smoothing",
+        "planarm.trajectory",
         "planarm.report",
     },
     "planarm.cli": {

@@ -9,7 +9,7 @@ import pytest
 
 from planarm.cli.main import main
 from planarm.experiments.lattice_lengths import steps_of_length
-from planarm.experiments.published import A_STAR, CASES, CHAOS, CHS, CLOCK_S, MODIFIED, PLANNERS, TABLE2
+from planarm.experiments.published import A_STAR, CASES, CHAOS, CHS, MODIFIED, PLANNERS, TABLE2
 from planarm.experiments.table2 import compare_table2, load_case, percentages, typical_path
 from planarm.experiments.table2_folder import write_table2
 from planarm.experiments.table2_tables import as_json, as_markdown, findings, tables
@@ -39,25 +39,10 @@ def test_all_16_published_percentages_are_the_papers_rule_cut_off_after_two_deci
     ]
 
 
-def test_by_the_usual_rule_the_large_published_percentages_are_others(result):
-    """176.39 % means 63.8 % less time, 98.95 % means 49.7 %."""
-    usual = {one.printed: one.published.usual_rule for one in result.improvements}
-    assert usual[176.39] == pytest.approx(63.82, abs=0.005)
-    assert usual[98.95] == pytest.approx(49.74, abs=0.005)
-    assert usual[5.59] == pytest.approx(5.29, abs=0.005)
-
-
 def test_the_two_rules():
     assert percentages(80.0, 50.0).paper_rule == 60.0
     assert percentages(80.0, 50.0).usual_rule == 37.5
     assert percentages(50.0, 80.0).usual_rule == -60.0
-
-
-def test_the_published_times_are_ticks_of_a_clock():
-    """To half of the fourth decimal, while ticks are 156 of them apart."""
-    for figures in TABLE2.values():
-        ticks = round(figures.time_s / CLOCK_S)
-        assert ticks * CLOCK_S == pytest.approx(figures.time_s, rel=0.0, abs=0.5000001e-4)
 
 
 def test_the_table_holds_each_planner_and_case_once():
@@ -94,11 +79,20 @@ def test_our_improvements_are_those_of_our_lengths_and_times(result):
             assert getattr(one, moves).usual_rule == pytest.approx(100 * (1 - new / old))
 
 
+def chs_like_cm(case, one):
+    """The octagon's own shortest length: Chaos A* that draws all of it, by the square or disc that holds it."""
+    holder = {8: A_STAR, 20: MODIFIED, 44: replace(MODIFIED, neighbours=48), 68: replace(CHS, neighbours=80)}
+    return case.search(holder[one.neighbours], one.moves).path.length_cm if one.neighbours != 68 else 0.0
+
+
 def test_chaos_a_star_is_a_distribution_never_shorter_than_with_its_whole_octagon(result):
-    assert len(result.scatter) == 8
+    assert len({(one.case, one.moves, one.subset, one.neighbours) for one in result.scatter}) == 2 * 2 * 2 * 4
+    cases = {number: load_case(number) for number in CASES}
     for one in result.scatter:
-        case = load_case(one.case)
-        found = [case.search(CHAOS, one.moves, seed, one.subset).path for seed in range(SEEDS)]
+        planner = replace(CHAOS, neighbours=one.neighbours)
+        found = [cases[one.case].search(planner, one.moves, seed, one.subset).path for seed in range(SEEDS)]
+        whole = chs_like_cm(cases[one.case], one)
+        assert one.shortest_cm >= whole - 1e-9
         lengths = sorted(path.length_cm for path in found if path is not None)
         assert one.no_path == SEEDS - len(lengths)
         assert (one.shortest_cm, one.longest_cm) == (lengths[0], lengths[-1])
@@ -111,25 +105,13 @@ def test_chaos_a_star_is_a_distribution_never_shorter_than_with_its_whole_octago
 
 def test_the_row_of_chaos_a_star_is_the_median_of_runs(result):
     for one in result.scatter:
-        if one.subset == "run":
+        if one.subset == "run" and one.as_published:
             assert getattr(row_of(result, one.case, CHAOS), one.moves).length_cm == one.median_cm
 
 
 def test_proving_moves_never_shortens_a_path(result):
     for row in result.rows:
         assert row.proved.length_cm >= row.nodes.length_cm
-
-
-def test_on_1_cm_cells_72_6559_and_72_8406_join_no_common_start_and_goal():
-    (a_star,) = steps_of_length(72.8406, 1.0, 4, knights=False)
-    (modified,) = steps_of_length(72.6559, 1.0, 4, knights=True)
-    assert (a_star, modified) == ((29, 31, 0), (30, 27, 2))
-    assert (a_star.odd, modified.odd) == (True, False)
-
-
-@pytest.mark.parametrize("cell_cm", [1.0, 0.5])
-def test_69_2297_is_no_length_of_24_neighbours(cell_cm):
-    assert steps_of_length(69.2297, cell_cm, 4, knights=True) == ()
 
 
 def test_parity_and_length_of_steps_hold_for_real_paths():
@@ -163,7 +145,9 @@ def test_only_paths_with_unproved_moves_come_nearer_than_the_margin(result):
 
 def test_the_typical_path_of_chaos_a_star_is_near_the_median(result):
     path, seed = typical_path(load_case(1), CHAOS, "nodes", SEEDS)
-    one = next(one for one in result.scatter if (one.case, one.moves, one.subset) == (1, "nodes", "run"))
+    one = next(
+        one for one in result.scatter if (one.case, one.neighbours, one.moves, one.subset) == (1, 44, "nodes", "run")
+    )
     assert load_case(1).search(CHAOS, "nodes", seed).path.length_cm == path.length_cm <= one.median_cm
     assert path.length_cm > one.p5_cm
 
@@ -176,7 +160,7 @@ def test_no_seeds_is_refused():
 def test_every_figure_reaches_the_json(result):
     told = json.loads(json.dumps(as_json(result), allow_nan=False))
     assert {"source", "assumed", "not_reproduced", "seeds", "maps", "rows", "improvements", "scatter"} == set(told)
-    assert [len(told[key]) for key in ("maps", "rows", "improvements", "scatter")] == [2, 8, 16, 8]
+    assert [len(told[key]) for key in ("maps", "rows", "improvements", "scatter")] == [2, 8, 16, 32]
     first = told["rows"][0]
     assert first["published"]["length_cm"] == 72.8406
     assert first["nodes"]["length_cm"] == pytest.approx(72.84062, abs=5e-6)
@@ -187,17 +171,18 @@ def test_every_figure_reaches_the_json(result):
 
 
 def test_what_is_not_a_number_is_null_in_json_and_none_in_words(result):
-    lost = replace(result.scatter[0], no_path=SEEDS, median_cm=float("nan"), published_or_shorter=float("nan"))
-    without = replace(result, scatter=(lost, *result.scatter[1:]))
-    assert as_json(without)["scatter"][0]["median_cm"] is None
-    assert "none" in tables(without)[-1].rows[0]
+    first = next(i for i, one in enumerate(result.scatter) if one.as_published)
+    lost = replace(result.scatter[first], no_path=SEEDS, median_cm=float("nan"), published_or_shorter=float("nan"))
+    without = replace(result, scatter=(*result.scatter[:first], lost, *result.scatter[first + 1 :]))
+    assert as_json(without)["scatter"][first]["median_cm"] is None
+    assert "none" in tables(without)[-1].rows[first]
     assert any("none %" in sentence for sentence in findings(without))
 
 
 def test_the_markdown_has_every_row_of_every_table(result):
     text = as_markdown(result)
     shown = tables(result)
-    assert [len(table.rows) for table in shown] == [8, 8, 8, 8, 8]
+    assert [len(table.rows) for table in shown] == [8, 8, 8, 8, 32]
     for table in shown:
         assert table.title in text
         assert all(len(cells) == len(table.header) for cells in table.rows)
@@ -209,8 +194,9 @@ def test_the_folder_holds_the_tables_and_a_picture_for_each_planner_and_case(res
     files = write_table2(result, tmp_path / "new" / "folder")
     assert sorted(files) == sorted((tmp_path / "new" / "folder").iterdir())
     pictures = {file.stem for file in files if file.suffix == ".png"}
-    expected = {f"case{case}_{planner.algorithm}" for case in CASES for planner in PLANNERS}
-    assert pictures == expected | {"stencils"}
+    paths = {f"case{case}_{planner.algorithm}" for case in CASES for planner in PLANNERS}
+    spaces = {f"case{case}_free_space" for case in CASES}
+    assert pictures == paths | {f"{name}_joints" for name in paths} | spaces | {"stencils"}
     assert all(file.read_bytes().startswith(b"\x89PNG") for file in files if file.suffix == ".png")
     assert json.loads((tmp_path / "new" / "folder" / "table2.json").read_text()) == as_json(result)
 

@@ -17,12 +17,31 @@ if TYPE_CHECKING:
     from rich.table import Table
 
     from planarm.experiments.table2 import Table2
-    from planarm.experiments.table2_tables import TextTable
+    from planarm.experiments.text_table import TextTable
 
 
 def execute(options: argparse.Namespace) -> int:
     """Compute the comparison, print it, and write it down where --out says."""
     tell_first_compile("planarm")
+    return _as_printed(options) if options.as_printed else _table2(options)
+
+
+def _as_printed(options: argparse.Namespace) -> int:
+    """Run the papers' printed equations and pseudo-code, errors included."""
+    from dataclasses import asdict
+
+    from planarm.experiments.as_printed import as_printed_tables, compare_as_printed
+
+    result = compare_as_printed()
+    if options.json:
+        print(json.dumps(asdict(result)))
+    else:
+        for one in as_printed_tables(result):
+            terminal().print(_shown(one))
+    return 0
+
+
+def _table2(options: argparse.Namespace) -> int:
     from planarm.experiments.table2 import compare_table2
     from planarm.experiments.table2_folder import write_table2
     from planarm.experiments.table2_tables import as_json

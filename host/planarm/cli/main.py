@@ -146,6 +146,9 @@ def _add_compare(commands: Commands) -> None:
     command = commands.add_parser("compare", help="compute a paper's table anew beside the published one")
     command.add_argument("table", choices=("table2",), help="table2: A*, Modified A*, Chaos A* and CHS, two cases")
     command.add_argument("--out", metavar="DIR", help="folder for table2.json, table2.md and pictures")
+    command.add_argument(
+        "--as-printed", action="store_true", help="run the printed equations and pseudo-code, errors included, instead"
+    )
     command.add_argument("--seeds", type=_count, default=200, metavar="N", help="draws of Chaos A* (default: 200)")
     _add_json(command)
 

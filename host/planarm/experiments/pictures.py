@@ -11,15 +11,18 @@ from numpy.typing import NDArray
 from planarm.model.arm import Arm
 from planarm.model.kinematics import forward, inverse_2r
 from planarm.model.shapes import shape_of
-from planarm.report import draw_workspace
+from planarm.report import draw_joint_angles, draw_workspace
 from planarm.report.stencils import StencilPanel, draw_stencils
 from planarm.scene import Algorithm, Scene
 from planarm.search.draw import draw_subset
 from planarm.search.path import Path as TipPath
 from planarm.search.stencils import DRAWN, stencil
+from planarm.smoothing.blend import blend_corners
+from planarm.trajectory.timing import time_path
 from planarm.workspace.free_map import FreeMap
 
 POSES_SHOWN = 7
+CURVE_POINTS = 600
 SEED = 1
 """Of the subsets shown for Chaos A*."""
 
@@ -48,6 +51,38 @@ def draw_path(
         subtitle=subtitle,
         tip_curve_cm=tip_curve_cm,
     )
+
+
+def draw_free_space(path_png: Path, scene: Scene, free_map: FreeMap) -> None:
+    """Draw the free Cartesian space and what forbids the rest, the arm at the start (paper C, fig. 10)."""
+    arm = Arm.from_spec(scene.arm)
+    map_words = f"margin {free_map.margin_cm:g} cm, cells of {free_map.cell_cm:g} cm"
+    ends_cm = np.array([scene.task.start_cm, scene.task.goal_cm])
+    draw_workspace(
+        path_png,
+        x_cm=free_map.x_cm,
+        y_cm=free_map.y_cm,
+        region=free_map.region,
+        obstacles=[shape_of(obstacle) for obstacle in scene.obstacles],
+        path_points_cm=None,
+        ends_cm=ends_cm,
+        poses_cm=forward(arm, inverse_2r(arm, ends_cm[:1], free_map.elbow)),
+        title=scene.name,
+        subtitle=f"{free_map.free_nodes} free nodes, {map_words}",
+    )
+
+
+def draw_angles(path_png: Path, scene: Scene, free_map: FreeMap, path: TipPath, *, subtitle: str) -> None:
+    """Draw the joint angles over time along a path, timed within the scene's joint limits (paper C, figs. 12 to 18).
+
+    The paper does not say how it times the motion; here corners are blended and the joints' limits used up.
+
+    Raises:
+        TimingError: the path runs into full stretch or full fold.
+    """
+    trajectory = time_path(blend_corners(path, free_map), scene.joints)
+    t_s = np.linspace(0.0, trajectory.duration_s, CURVE_POINTS)
+    draw_joint_angles(path_png, t_s, trajectory.sample(t_s)[0], title=scene.name, subtitle=subtitle)
 
 
 def draw_paper_stencils(path_png: Path) -> None:

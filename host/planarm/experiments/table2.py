@@ -7,7 +7,7 @@ seeds; where one figure has to stand for it, it is the median of the seeds that 
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from math import nan
 from statistics import median
@@ -24,6 +24,7 @@ from planarm.scene import Moves, PlannerSpec, Scene, Subset
 from planarm.search.grid_search import find_path
 from planarm.search.path import Path
 from planarm.search.result import SearchResult
+from planarm.search.stencils import DRAWN
 from planarm.workspace.free_map import FreeMap, build_free_map
 from planarm.workspace.world import clearances_cm
 
@@ -37,6 +38,8 @@ Quantity = Literal["length", "time"]
 READINGS: Final[tuple[Moves, ...]] = ("nodes", "proved")
 SUBSETS: Final[tuple[Subset, ...]] = ("run", "expansion")
 QUANTITIES: Final[tuple[Quantity, ...]] = ("length", "time")
+CHAOS_SIZES: Final = tuple(replace(CHAOS, neighbours=neighbours) for neighbours in sorted(DRAWN))
+"""Paper C, fig. 6: 5 of 8, 12 of 20, 23 of 44 and 34 of 68."""
 
 Notice = Callable[[str, float], None]
 
@@ -93,6 +96,10 @@ class Scatter:
 
     case: int
     moves: Moves
+    neighbours: int
+    """The octagon: 8, 20, 44 or 68 nodes."""
+    drawn: int
+    """How many of them are drawn."""
     subset: Subset
     seeds: int
     no_path: int
@@ -103,6 +110,7 @@ class Scatter:
     p95_cm: float
     longest_cm: float
     published_cm: float
+    """The paper's one length of this case, drawn from 44."""
     published_or_shorter: float
     """Share of the found paths that are no longer than the published one."""
     time_ms: float
@@ -111,6 +119,11 @@ class Scatter:
     def no_path_share(self) -> float:
         """Share of the seeds that find no path."""
         return self.no_path / self.seeds
+
+    @property
+    def as_published(self) -> bool:
+        """Whether it is the octagon that the paper's lengths come from."""
+        return self.neighbours == CHAOS.neighbours
 
 
 @dataclass(frozen=True, slots=True)
@@ -165,7 +178,12 @@ def compare_table2(seeds: int = SEEDS, notice: Notice = lambda _stage, _share: N
         case = load_case(number)
         world = case.free_map
         maps.append(MapFigures(number, world.free_nodes, world.margin_cm, world.cell_cm, case.build_ms))
-        spread = [_scatter(case, moves, subset, seeds) for moves in READINGS for subset in SUBSETS]
+        spread = [
+            _scatter(case, planner, moves, subset, seeds)
+            for planner in CHAOS_SIZES
+            for moves in READINGS
+            for subset in SUBSETS
+        ]
         rows += [_row(case, planner, spread) for planner in PLANNERS]
         scatter += spread
     notice("compare", 1.0)
@@ -245,19 +263,21 @@ def _measured(case: Case, planner: Planner, moves: Moves) -> Ours:
 
 def _median_of_seeds(spread: Sequence[Scatter], moves: Moves) -> Ours:
     """Return what stands for Chaos A* in the rows: its subset is drawn once a run there."""
-    one = next(one for one in spread if one.moves == moves and one.subset == "run")
+    one = next(one for one in spread if one.as_published and one.moves == moves and one.subset == "run")
     return Ours(one.median_cm, one.time_ms, nan)
 
 
-def _scatter(case: Case, moves: Moves, subset: Subset, seeds: int) -> Scatter:
-    case.search(CHAOS, moves, 0, subset)  # not counted
-    results = [case.search(CHAOS, moves, seed, subset) for seed in range(seeds)]
+def _scatter(case: Case, planner: Planner, moves: Moves, subset: Subset, seeds: int) -> Scatter:
+    case.search(planner, moves, 0, subset)  # not counted
+    results = [case.search(planner, moves, seed, subset) for seed in range(seeds)]
     found = np.array([result.path.length_cm for result in results if result.path is not None])
     shortest, p5, middle, p95, longest = np.percentile(found, (0, 5, 50, 95, 100)) if found.size else [nan] * 5
     published_cm = TABLE2[case.number, CHAOS].length_cm
     return Scatter(
         case=case.number,
         moves=moves,
+        neighbours=planner.neighbours,
+        drawn=DRAWN[planner.neighbours],
         subset=subset,
         seeds=seeds,
         no_path=seeds - found.size,

@@ -70,11 +70,12 @@ def draw_workspace(
     y_cm: ArrayLike,
     region: ArrayLike,
     obstacles: Sequence[CircleOutline | PolygonOutline],
-    path_points_cm: ArrayLike,
+    path_points_cm: ArrayLike | None,
     poses_cm: ArrayLike,
     title: str,
     subtitle: str = "",
     tip_curve_cm: ArrayLike | None = None,
+    ends_cm: ArrayLike | None = None,
 ) -> None:
     """Draw the map's regions, the obstacles, the path and the arm on its way from start to goal.
 
@@ -84,29 +85,34 @@ def draw_workspace(
         y_cm: the same, shape (rows,).
         region: region code of each node, shape (rows, columns).
         obstacles: circles (`center_cm`, `radius_cm`) and polygons (`vertices_cm`), outlined as they are.
-        path_points_cm: way-points from start to goal, shape (n, 2), n >= 1.
+        path_points_cm: way-points from start to goal, shape (n, 2), n >= 1; None where there is no path.
         poses_cm: a handful of poses, from start to goal, each the base, the joints and the end effector: shape
             (k, joints + 1, 2). They fade in on the way to the goal.
         title: above the picture.
         subtitle: a quiet line below the title.
         tip_curve_cm: points along the smoothed path, shape (m, 2), when there is one.
+        ends_cm: start and goal, shape (2, 2), for where there is no path to show them.
 
     Raises:
         ValueError: the arrays do not have these shapes, or a region code is unknown.
     """
     free_map = _checked_map(x_cm, y_cm, region)
-    points_cm = _array(path_points_cm, "path_points_cm", (None, 2))
+    points_cm = None if path_points_cm is None else _array(path_points_cm, "path_points_cm", (None, 2))
     arms_cm = _array(poses_cm, "poses_cm", (None, None, 2))
     figure = new_figure(9.0, _height_in(free_map, 9.0))
     axes = figure.add_subplot()
     handles: list[Artist] = [*_draw_regions(axes, free_map), *_draw_obstacles(axes, obstacles)]
     handles += _draw_arms(axes, arms_cm)
-    if tip_curve_cm is None:
-        handles += _draw_path(axes, points_cm, "path")
-    else:
+    if tip_curve_cm is not None:
         handles += _draw_path(axes, _array(tip_curve_cm, "tip_curve_cm", (None, 2)), "path, corners blended")
-        axes.plot(*points_cm.T, "o", color="white", markeredgecolor=BLUE, markersize=3.2, markeredgewidth=0.9, zorder=6)
-    handles += _draw_ends(axes, points_cm)
+        if points_cm is not None:
+            look: dict[str, Any] = {"color": "white", "markeredgecolor": BLUE, "markersize": 3.2}
+            axes.plot(*points_cm.T, "o", **look, markeredgewidth=0.9, zorder=6)
+    elif points_cm is not None:
+        handles += _draw_path(axes, points_cm, "path")
+    ends = points_cm if ends_cm is None else _array(ends_cm, "ends_cm", (2, 2))
+    if ends is not None:
+        handles += _draw_ends(axes, ends)
     _finish(axes, free_map, arms_cm)
     set_title(axes, title, subtitle)
     figure.legend(handles=handles, loc="outside lower center", ncols=5, fontsize=TEXT_SIZE, frameon=False)
