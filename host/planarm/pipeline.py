@@ -23,7 +23,8 @@ from planarm.run_folder import begin_run_folder, finish_run_folder
 from planarm.scene import Scene
 from planarm.search.grid_search import find_path
 from planarm.search.path import Path as TipPath
-from planarm.smoothing.blend import blend_corners
+from planarm.smoothing.smooth import smooth_path
+from planarm.smoothing.smooth_path import SmoothPath
 from planarm.stepping.certify import Certificate, certify
 from planarm.stepping.quantise import quantisation_bound_cm, quantise
 from planarm.stepping.segments import SegmentPlan, compress, expand
@@ -31,6 +32,7 @@ from planarm.summary import summarise
 from planarm.trajectory.timing import time_path
 from planarm.workspace.check_task import check_task
 from planarm.workspace.free_map import FreeMap, build_free_map
+from planarm.workspace.joint_proof import joint_world
 from planarm.workspace.world import elbow_sides
 from planarm_wire.messages import DIR_PINS, STEP_PINS
 
@@ -53,8 +55,8 @@ def plan_scene(scene: Scene, notice: Notice) -> Plan:
     notice("plan", 0.0)
     free_map, path, search_s = shortest_path(scene)
     notice("plan", 0.4)
-    smooth_path = blend_corners(path, free_map)
-    trajectory = time_path(smooth_path, scene.joints)
+    smooth = smoothed(scene, free_map, path)
+    trajectory = time_path(smooth, scene.joints, scene.motion.acceleration_share)
     if trajectory.duration_s > LONGEST_MOTION_S:
         raise TimingError(
             f"{scene.source}: the motion would take {trajectory.duration_s:.6g} s, {LONGEST_MOTION_S:g} s are the "
@@ -70,7 +72,7 @@ def plan_scene(scene: Scene, notice: Notice) -> Plan:
         scene,
         free_map,
         path,
-        smooth_path,
+        smooth,
         trajectory,
         train,
         segments,
@@ -106,6 +108,19 @@ def shortest_path(scene: Scene) -> tuple[FreeMap, TipPath, float]:
     if not found:
         raise problems[0]
     return min(found, key=lambda one: one[1].length_cm)
+
+
+def smoothed(scene: Scene, free_map: FreeMap, path: TipPath) -> SmoothPath:
+    """Round the path's corners, or stop at them, as the scene says.
+
+    Raises:
+        TimingError: The path meets full stretch or fold, and no motion near it can be proved free.
+    """
+    world = joint_world(scene, free_map.margin_cm)
+    motion = scene.motion
+    return smooth_path(
+        path, free_map, Arm.from_spec(scene.arm), world, motion.tolerance_cm, stop=motion.corners == "stop"
+    )
 
 
 def stored(plan: Plan) -> StoredPlan:

@@ -21,6 +21,7 @@ TABLES = {
     "link": load.LINK_KEYS,
     "mechanics": load.MECHANICS_KEYS,
     "transmission": load.TRANSMISSION_KEYS,
+    "motion": load.MOTION_KEYS,
 }
 
 

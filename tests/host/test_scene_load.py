@@ -5,7 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from planarm.scene import Obstacle, PlannerSpec, load_scene, parse_scene, with_planner
+from planarm.errors import SceneError
+from planarm.scene import MotionSpec, Obstacle, PlannerSpec, load_scene, parse_scene, with_planner
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 
@@ -38,6 +39,7 @@ def test_the_least_scene_has_the_documented_defaults():
     assert (scene.workspace.cell_cm, scene.workspace.clearance_cm) == (1.0, 0.0)
     assert scene.obstacles == ()
     assert scene.planner == PlannerSpec("chs", 56, "run", 1, "proved")
+    assert scene.motion == MotionSpec("blend", 0.5, 0.8)
     assert (scene.link.port, scene.link.baud) == ("sim://", 250_000)
     joint = scene.joints[0]
     assert (joint.steps_per_rev, joint.microsteps, joint.gear_ratio, joint.driver) == (200, 16, 1.0, "a4988")
@@ -121,3 +123,22 @@ def test_every_neighbourhood_of_every_algorithm_is_taken(algorithm, neighbours):
 def test_the_grid_is_made_of_multiples_of_the_cell():
     scene = parse_scene(LEAST.replace("[task]", "cell_cm = 0.1\n[task]"), "least.toml")
     assert (scene.workspace.columns, scene.workspace.rows) == (range(-500, 501), range(0, 501))
+
+
+def test_the_motion_table_is_read():
+    scene = parse_scene(LEAST + '[motion]\ncorners = "stop"\ntolerance_cm = 0.2\nacceleration_share = 1\n', "m.toml")
+    assert scene.motion == MotionSpec("stop", 0.2, 1.0)
+
+
+@pytest.mark.parametrize(
+    ("line", "words"),
+    [
+        ('corners = "round"', r"motion.corners: 'round' given, one of 'blend', 'stop' expected"),
+        ("tolerance_cm = 0", r"motion.tolerance_cm: 0 given"),
+        ("tolerance_mm = 3", r"motion.tolerance_mm: wrong unit: 'tolerance_cm' expected"),
+        ("acceleration_share = 1.2", r"motion.acceleration_share: 1.2 given, .* at most 1"),
+    ],
+)
+def test_a_wrong_motion_table_is_refused(line, words):
+    with pytest.raises(SceneError, match=words):
+        parse_scene(LEAST + "[motion]\n" + line, "m.toml")

@@ -1,5 +1,6 @@
 """Corner blends: geometry in closed form, angles and derivatives against plain kinematics, freedom by samples."""
 
+import re
 from math import hypot, pi, sqrt
 
 import numpy as np
@@ -9,13 +10,12 @@ from hypothesis import strategies as st
 
 from host_scenes import make_scene, oracle_clearance_cm, random_obstacles
 from motion_paths import tip_path, tip_points
-from planarm.errors import TimingError
 from planarm.model.arm import Arm
 from planarm.model.kinematics import forward, inverse_2r
 from planarm.scene import Obstacle
 from planarm.search.grid_search import find_path
 from planarm.search.path import Path
-from planarm.smoothing.blend import blend_corners, way_points
+from planarm.smoothing.blend import bends_everywhere, blend_corners, stretched_place, way_points
 from planarm.workspace.free_map import build_free_map
 
 RIGHT_ANGLE = [(40.0, 0.0), (40.0, 20.0), (20.0, 20.0)]
@@ -180,6 +180,17 @@ def test_a_corner_that_nothing_proves_stays_a_stop():
         ([(29.0, 40.0), (30.0, 40.01), (30.0, 30.0)], r"tip \((29|30).\d+, (39|40).\d+\)"),
     ],
 )
-def test_full_stretch_and_full_fold_are_refused_with_their_place(points, place):
-    with pytest.raises(TimingError, match=place):
-        tip_path(points, tolerance_cm=0.002)
+def test_full_stretch_and_full_fold_are_seen_with_their_place(points, place):
+    path = tip_path(points, tolerance_cm=0.002)
+    assert not bends_everywhere(path)
+    assert re.search(place, stretched_place(path))
+
+
+def test_a_path_with_a_bent_elbow_is_no_stretched_one():
+    assert bends_everywhere(tip_path(RIGHT_ANGLE))
+
+
+def test_without_a_tolerance_every_corner_is_a_stop():
+    path = tip_path([(40.0, 0.0), (40.0, 10.0), (30.0, 10.0), (30.0, 20.0)], tolerance_cm=None)
+    assert path.stops_s.tolist() == [10.0, 20.0]
+    assert path.borders_s.tolist() == [0.0, 10.0, 20.0, 30.0]

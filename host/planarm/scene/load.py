@@ -7,6 +7,7 @@ from pathlib import Path
 
 from planarm.errors import SceneError
 from planarm.scene.mechanics import MECHANICS_KEYS, TRANSMISSION_KEYS, parse_coupling, parse_mechanics
+from planarm.scene.motion import MOTION_KEYS, read_motion
 from planarm.scene.motor import KEYS as MOTOR_KEYS
 from planarm.scene.motor import parse_motor
 from planarm.scene.simple_polygon import polygon_problem
@@ -28,7 +29,19 @@ from planarm.scene.types import (
     WorkspaceSpec,
 )
 
-ROOT_KEYS = ("name", "arm", "workspace", "obstacles", "task", "planner", "joints", "link", "mechanics", "transmission")
+ROOT_KEYS = (
+    "name",
+    "arm",
+    "workspace",
+    "obstacles",
+    "task",
+    "planner",
+    "joints",
+    "link",
+    "mechanics",
+    "transmission",
+    "motion",
+)
 ARM_KEYS = ("link_lengths_cm", "link_width_cm", "base_cm", "elbow", "joint_limits_deg", "floor")
 WORKSPACE_KEYS = ("x_cm", "y_cm", "cell_cm", "clearance_cm")
 ROUND_KEYS = ("shape", "center_cm", "diameter_cm")
@@ -112,6 +125,7 @@ def parse_scene(text: str, source: str) -> Scene:
         link=_link(root.table("link", LINK_KEYS, optional=True)),
         mechanics=parse_mechanics(root.table("mechanics", MECHANICS_KEYS, optional=True), arm.link_lengths_cm),
         coupling=parse_coupling(root.table("transmission", TRANSMISSION_KEYS, optional=True), LINKS),
+        motion=read_motion(root.table("motion", MOTION_KEYS, optional=True)),
     )
 
 

@@ -12,6 +12,7 @@ Shape = Literal["circle", "square", "diamond", "triangle", "hexagon", "polygon"]
 Algorithm = Literal["a_star", "modified_a_star", "chaos_a_star", "chs"]
 Subset = Literal["run", "expansion"]
 Moves = Literal["proved", "nodes"]
+Corners = Literal["blend", "stop"]
 
 Point = tuple[float, float]
 Range = tuple[float, float]
@@ -90,6 +91,17 @@ class PlannerSpec:
 
 
 @dataclass(frozen=True, slots=True)
+class MotionSpec:
+    """How a path becomes a motion: what happens at its corners, and how much of the acceleration is used."""
+
+    corners: Corners = "blend"
+    tolerance_cm: float = 0.5
+    """Largest distance of the tip from the path's straight moves."""
+    acceleration_share: float = 0.8
+    """Share of each joint's acceleration that the plan uses; the rest keeps a stop along the path possible."""
+
+
+@dataclass(frozen=True, slots=True)
 class JointSpec:
     """A joint's stepper motor, gear and limits.
 
@@ -137,6 +149,7 @@ class Scene:
     mechanics: MechanicsSpec
     coupling: Matrix
     """Row m says how far motor m turns, behind its gear, when each joint turns once."""
+    motion: MotionSpec = MotionSpec()
 
     @property
     def margin_cm(self) -> float:

@@ -6,15 +6,15 @@ so a tolerance for that distance gives the largest d. Each leg is shared by the 
 A curve that cannot be proved free is tried with half of d, and so on; a corner left sharp is a stop.
 """
 
+from math import acos, atan2, floor, pi, sqrt
+
 import numpy as np
 
-from planarm.errors import TimingError
 from planarm.search.path import Path
-from planarm.smoothing.smooth_path import Floats, SmoothPath, TwoLinks, angle_between, joint_angles
+from planarm.smoothing.smooth_path import Floats
+from planarm.smoothing.tip_path import TipPath, TipPieces, TwoLinks, angle_between
 from planarm.workspace.free_map import FreeMap
 from planarm.workspace.proof import PROVED, prove_curve
-
-__all__ = ["SmoothPath", "blend_corners"]
 
 DEFAULT_TOLERANCE_CM = 0.5
 """The tip leaves a corner by at most this, unless told otherwise."""
@@ -32,33 +32,31 @@ SINGULAR_RAD = 0.01
 """Nearer than this to full stretch or full fold, theta2 turns so sharply on the path that no timing is worth having."""
 
 
-def blend_corners(path: Path, free_map: FreeMap, tolerance_cm: float = DEFAULT_TOLERANCE_CM) -> SmoothPath:
+def blend_corners(path: Path, free_map: FreeMap, tolerance_cm: float | None = DEFAULT_TOLERANCE_CM) -> TipPath:
     """Return the path with its corners rounded as much as tolerance and obstacles allow.
 
     Args:
         path: way-points of the tip, with straight moves between them that are free.
         free_map: where the tip may be; its margin is kept.
-        tolerance_cm: largest distance of the rounded path from a corner.
+        tolerance_cm: largest distance of the rounded path from a corner; None stops at every corner.
 
     Raises:
-        TimingError: the path runs into full stretch or full fold, where joint speeds have no bound.
         ValueError: the path has no point, or one that is no number; or the tolerance is not above 0.
     """
-    if not tolerance_cm > 0.0:
+    if tolerance_cm is not None and not tolerance_cm > 0.0:
         raise ValueError(f"the tolerance is {tolerance_cm} cm; it must be above 0")
     corners = way_points(path.points_cm)
     arm = free_map.world.arm
-    links = TwoLinks(arm.l1_cm, arm.l2_cm, (arm.base_x_cm, arm.base_y_cm), free_map.elbow)
+    links = TwoLinks(arm.l1_cm, arm.l2_cm, arm.base_x_cm, arm.base_y_cm, arm.side)
     legs = np.diff(corners, axis=0)
     lengths = np.hypot(legs[:, 0], legs[:, 1])
     units = legs / lengths[:, None]
     cuts = np.zeros(len(corners))
-    for k in range(1, len(corners) - 1):
-        largest = 0.5 * min(lengths[k - 1], lengths[k])
-        cuts[k] = _proved_cut(corners[k], units[k - 1], units[k], largest, tolerance_cm, free_map)
-    smooth = _assemble(links, corners, units, lengths, cuts, arm.turn_start_rad)
-    _require_bent_elbow(smooth)
-    return smooth
+    if tolerance_cm is not None:
+        for k in range(1, len(corners) - 1):
+            largest = 0.5 * min(lengths[k - 1], lengths[k])
+            cuts[k] = _proved_cut(corners[k], units[k - 1], units[k], largest, tolerance_cm, free_map)
+    return _assemble(links, corners, units, lengths, cuts, arm.turn_start_rad)
 
 
 def way_points(points_cm: Floats) -> Floats:
@@ -100,7 +98,7 @@ def _proved_cut(
 
 def _assemble(
     links: TwoLinks, corners: Floats, units: Floats, lengths: Floats, cuts: Floats, turn_start_rad: float
-) -> SmoothPath:
+) -> TipPath:
     """Return the path made of what the cuts leave of each leg, and a parabola at each cut corner."""
     sizes, slopes, bends, tips, stops = [], [], [], [corners[0]], []
     for k, length in enumerate(lengths):
@@ -119,46 +117,57 @@ def _assemble(
             stops.append(len(sizes))
     borders = np.concatenate([[0.0], np.cumsum(sizes)])
     tips_cm = np.array(tips)
-    return SmoothPath(
-        links,
+    pieces = TipPieces(
         borders,
         tips_cm,
-        np.array(slopes).reshape(-1, 2),
-        np.array(bends).reshape(-1, 2),
+        np.array(slopes or [np.zeros(2)]),
+        np.array(bends or [np.zeros(2)]),
         _directions_rad(links, tips_cm, turn_start_rad),
-        borders[stops],
     )
+    return TipPath(links, pieces, borders[stops])
 
 
 def _directions_rad(links: TwoLinks, tips_cm: Floats, turn_start_rad: float) -> Floats:
     """Return the tip's direction at each border, without jumps, so that theta1 starts in the turn of its limits."""
-    to_tips = tips_cm - links.base_cm
+    to_tips = tips_cm - (links.base_x_cm, links.base_y_cm)
     turns = angle_between(to_tips[:-1], to_tips[1:])
-    first = np.arctan2(to_tips[:1, 1], to_tips[:1, 0])
-    theta1 = joint_angles(links, tips_cm[:1], first)[0, 0]
-    if np.isfinite(theta1):
-        first -= 2.0 * np.pi * np.floor((theta1 - turn_start_rad) / (2.0 * np.pi))
-    return np.concatenate([first, first + np.cumsum(turns)])
+    first = atan2(to_tips[0, 1], to_tips[0, 0])
+    r2, l1, l2 = float(to_tips[0] @ to_tips[0]), links.l1_cm, links.l2_cm
+    beta = acos(min(1.0, max(-1.0, (r2 + l1 * l1 - l2 * l2) / (2.0 * l1 * sqrt(r2)))))
+    theta1 = first + links.side * beta
+    first -= 2.0 * pi * floor((theta1 - turn_start_rad) / (2.0 * pi))
+    return first + np.concatenate([[0.0], np.cumsum(turns)])
 
 
-def _require_bent_elbow(path: SmoothPath) -> None:
-    """Check that theta2 stays clear of 0 and pi, at the tip's least and greatest distances from the base."""
-    s = np.concatenate([path.borders_s, *(_distance_extremes(path, k) for k in range(len(path.slopes)))])
-    sines = np.abs(np.sin(path.evaluate(s).q_rad[:, 1]))
-    worst = int(np.argmin(np.nan_to_num(sines)))
-    if not sines[worst] >= np.sin(SINGULAR_RAD):
-        raise TimingError(
-            f"the elbow is not {np.degrees(SINGULAR_RAD):.2g} deg off full stretch or full fold at "
-            f"{path.place(float(s[worst]))}, where no speed of the tip is slow enough for the joints; narrow "
-            f"arm.joint_limits_deg[2], or move the task's points"
-        )
+def bends_everywhere(path: TipPath) -> bool:
+    """Tell whether theta2 stays clear of 0 and pi."""
+    return bool(_least_bend(path)[0] >= np.sin(SINGULAR_RAD))
 
 
-def _distance_extremes(path: SmoothPath, k: int) -> Floats:
+def stretched_place(path: TipPath) -> str:
+    """Say where the elbow is nearest to full stretch or full fold."""
+    return path.place(_least_bend(path)[1])
+
+
+def _least_bend(path: TipPath) -> tuple[float, float]:
+    """Return (least |sin theta2|, its s): at an end of a piece, or where the tip is nearest or farthest on it."""
+    s = np.concatenate([path.borders_s, *(_distance_extremes(path, k) for k in range(len(path.pieces.slopes)))])
+    sines = np.nan_to_num(np.abs(np.sin(path.evaluate(s).q_rad[:, 1])))
+    worst = int(np.argmin(sines))
+    return float(sines[worst]), float(s[worst])
+
+
+def _distance_extremes(path: TipPath, k: int) -> Floats:
     """Return s inside piece k where the tip's distance from the base is stationary: to_tip . d(tip)/ds = 0, a cubic."""
-    start, slope, bend = path.tips_cm[k] - path.links.base_cm, path.slopes[k], path.bends_per_cm[k]
-    cubic = [0.5 * bend @ bend, 1.5 * slope @ bend, slope @ slope + start @ bend, start @ slope]
-    roots = np.roots(np.trim_zeros(cubic, "f"))
-    into: Floats = np.real(roots[np.abs(np.imag(roots)) <= STRAIGHT])
-    size = path.borders_s[k + 1] - path.borders_s[k]
-    return np.asarray(path.borders_s[k] + into[(into > 0.0) & (into < size)])
+    pieces = path.pieces
+    if len(pieces.borders_s) == 1:
+        return np.zeros(0)
+    start = pieces.tips_cm[k] - (path.links.base_x_cm, path.links.base_y_cm)
+    slope, bend = pieces.slopes[k], pieces.bends_per_cm[k]
+    if not bend.any():
+        into = np.array([-(start @ slope) / (slope @ slope)])
+    else:
+        roots = np.roots([0.5 * bend @ bend, 1.5 * slope @ bend, slope @ slope + start @ bend, start @ slope])
+        into = np.real(roots[np.abs(np.imag(roots)) <= STRAIGHT])
+    size = pieces.borders_s[k + 1] - pieces.borders_s[k]
+    return np.asarray(pieces.borders_s[k] + into[(into > 0.0) & (into < size)])

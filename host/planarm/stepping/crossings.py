@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 
 from planarm.errors import TimingError
 from planarm.model.transmission import Transmission
+from planarm.smoothing.smooth_path import SmoothPath
 from planarm.stepping.train import Directions, Floats
-from planarm.trajectory.joint_path import JointPath
 
 Indices = NDArray[np.intp]
 
@@ -48,7 +48,7 @@ class _Pieces:
     rate_high: Floats
 
 
-def find_crossings(path: JointPath, grid_s: Floats, transmission: Transmission) -> Crossings:
+def find_crossings(path: SmoothPath, grid_s: Floats, transmission: Transmission) -> Crossings:
     """Return every crossing of every motor.
 
     Args:
@@ -75,7 +75,7 @@ def find_crossings(path: JointPath, grid_s: Floats, transmission: Transmission) 
     return Crossings(motor, s, direction.astype(np.int8))
 
 
-def _monotone_pieces(path: JointPath, s: Floats, usteps_per_rad: Floats, zero_usteps: Floats) -> _Pieces:
+def _monotone_pieces(path: SmoothPath, s: Floats, usteps_per_rad: Floats, zero_usteps: Floats) -> _Pieces:
     """Cut the grid's intervals at turning points, motor by motor."""
     right, left = path.evaluate(s[:-1], "right"), path.evaluate(s[1:], "left")
     x_low, x_high = (side.q_rad @ usteps_per_rad.T - zero_usteps for side in (right, left))
@@ -98,7 +98,7 @@ def _monotone_pieces(path: JointPath, s: Floats, usteps_per_rad: Floats, zero_us
     )
 
 
-def _turning_points(path: JointPath, gear: Floats, low: Floats, high: Floats, rate_low: Floats) -> Floats:
+def _turning_points(path: SmoothPath, gear: Floats, low: Floats, high: Floats, rate_low: Floats) -> Floats:
     """Return where a motor's rate changes its sign between `low` and `high`.
 
     By false position (Illinois: an end that stays twice counts half), with bisection each time three steps have not
@@ -143,7 +143,7 @@ def _cubic_guess(pieces: _Pieces, piece: Indices, middles: Floats) -> Floats:
 
 
 def _located(
-    path: JointPath, gear: Floats, middles: Floats, direction: Floats, bracket: tuple[Floats, Floats, Floats]
+    path: SmoothPath, gear: Floats, middles: Floats, direction: Floats, bracket: tuple[Floats, Floats, Floats]
 ) -> Floats:
     """Return where each motor passes its middle; the bracket is (guess, low, high)."""
     s, low, high = bracket

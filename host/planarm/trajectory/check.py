@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from planarm.trajectory.joint_path import Floats
+from planarm.smoothing.smooth_path import Floats
 from planarm.trajectory.motion import Trajectory
 
 SUBSTEPS = 10

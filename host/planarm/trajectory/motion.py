@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from planarm.trajectory.joint_path import Floats, JointPath
+from planarm.smoothing.smooth_path import Floats, SmoothPath
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,7 +22,7 @@ class Trajectory:
         q_rad: joint angles at the gridpoints, shape (m, joints).
     """
 
-    path: JointPath
+    path: SmoothPath
     t_s: Floats
     s: Floats
     s_dot: Floats

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 from planarm.errors import TimingError
 from planarm.scene import JointSpec
+from planarm.smoothing.smooth_path import Floats, SmoothPath
 from planarm.trajectory.check import LimitUse, limit_use
-from planarm.trajectory.joint_path import Floats, JointPath
 from planarm.trajectory.motion import Trajectory
 from planarm.trajectory.topp import fastest_squared_speeds
 
@@ -55,7 +55,7 @@ class _Grid:
     acceleration_share: Floats
 
 
-def time_path(path: JointPath, joints: Sequence[JointSpec], share: float = STOPPING_SHARE) -> Trajectory:
+def time_path(path: SmoothPath, joints: Sequence[JointSpec], share: float = STOPPING_SHARE) -> Trajectory:
     """Return the fastest motion along the path, at rest at its ends and stops.
 
     Args:
@@ -102,7 +102,7 @@ def _limits_of(joints: Sequence[JointSpec], share: float) -> _Limits:
     )
 
 
-def _first_gridpoints(path: JointPath, joints: int) -> Floats:
+def _first_gridpoints(path: SmoothPath, joints: int) -> Floats:
     """Return gridpoints at every border and, between them, about every FIRST_STEP_RAD of the joints' travel."""
     borders = path.borders_s
     if not np.isfinite(borders).all() or (np.diff(borders) <= 0.0).any():
@@ -116,7 +116,7 @@ def _first_gridpoints(path: JointPath, joints: int) -> Floats:
     return np.concatenate([*pieces, borders[-1:]])
 
 
-def _finite_angles(path: JointPath, s: Floats, joints: int) -> Floats:
+def _finite_angles(path: SmoothPath, s: Floats, joints: int) -> Floats:
     """Return the angles at s after checking that they and their derivatives are numbers."""
     for side in ("left", "right"):
         state = path.evaluate(s, "left" if side == "left" else "right")
@@ -135,7 +135,7 @@ def _finite_angles(path: JointPath, s: Floats, joints: int) -> Floats:
     return path.evaluate(s).q_rad
 
 
-def _solve(path: JointPath, grid: _Grid, limits: _Limits) -> Trajectory:
+def _solve(path: SmoothPath, grid: _Grid, limits: _Limits) -> Trajectory:
     """Return the fastest motion on the grid."""
     s = grid.s
     h = np.diff(s)[:, None]
@@ -160,7 +160,7 @@ def _solve(path: JointPath, grid: _Grid, limits: _Limits) -> Trajectory:
     return Trajectory(path, t_s, s, s_dot, path.evaluate(s).q_rad)
 
 
-def _squared_limits(path: JointPath, grid: _Grid, limits: _Limits, dq_start: Floats, dq_end: Floats) -> Floats:
+def _squared_limits(path: SmoothPath, grid: _Grid, limits: _Limits, dq_start: Floats, dq_end: Floats) -> Floats:
     """Return the largest x by the speed limits at each gridpoint: the least over both sides and all joints."""
     allowed = limits.speeds_rad_s * grid.speed_share
     # A gridpoint at which no joint moves gets the largest limit found elsewhere.
