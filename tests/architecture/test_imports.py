@@ -35,8 +35,10 @@ ALLOWED: dict[str, set[str]] = {
         "planarm.search",
         "planarm_wire.kernel_cache",
     },
+    "planarm.dynamics": {"planarm.scene", "planarm_wire.kernel_cache"},
     "planarm.trajectory": {
         "planarm.errors",
+        "planarm.dynamics",
         "planarm.scene",
         "planarm.model",
         "planarm.smoothing",
