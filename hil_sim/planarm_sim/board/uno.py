@@ -18,6 +18,7 @@ from planarm_sim.board.pins import PINS, PinPlace, pin_place
 from planarm_sim.board.serial import CLOCK_HZ, FRAME_BITS, SerialPort, SerialState
 from planarm_sim.cpu.chip import EDGE_DTYPE, Chip, ResetCause, Snapshot, StopCause
 from planarm_sim.errors import LimitError, PinError, StoppedError, UsageError
+from planarm_sim.insight import Insight, Observer
 from planarm_sim.loader import Image, join_bootloader, load_elf, load_hex, load_image
 from planarm_sim.peripherals.adc import AREF
 from planarm_sim.trace import EDGE, VcdWriter
@@ -117,6 +118,8 @@ class Uno:
         else:
             raise UsageError("a board with neither program nor boot loader does nothing; give one of them")
         self._source = image.source
+        self._symbols = image.symbols
+        self._observer: Observer | None = None
         self.serial = SerialPort(self._chip, baud)
         self._edges: list[NDArray[Any]] = []
         self._log_start_cycle = 0
@@ -298,6 +301,46 @@ class Uno:
             vcd.write(self._recorded(), signal_of)
             vcd.close(self.cycle)
 
+    def observe(self, *, symbols: str | Path | None = None, keep_intervals: bool = True) -> None:
+        """Watch the program from now on, or anew; see `insight`. The board does the same, a few times slower.
+
+        Args:
+            symbols: ELF file with the program's functions, for a program that came as Intel HEX.
+            keep_intervals: keep each interrupt for `interrupt_intervals`; memory grows with every one.
+
+        Raises:
+            ImageError: `symbols` cannot be read.
+        """
+        functions = self._symbols if symbols is None else load_elf(symbols).symbols
+        self._observer = Observer(functions, keep_intervals=keep_intervals)
+        self._observer.begin(self.cycle)
+        self._chip.watch(self._observer)
+
+    def insight(self) -> Insight:
+        """What the program did since `observe`, or since the last `restore` after it.
+
+        Raises:
+            UsageError: the program is not watched.
+        """
+        return self._watching().insight(self.cycle)
+
+    def interrupt_intervals(self) -> NDArray[Any]:
+        """Every interrupt that has returned since `observe`, in order of entries.
+
+        Returns:
+            Structured array: vector (number, see `planarm_sim.insight.VECTOR_NAMES`), flag, entry, exit (cycles: the
+            request came to stand, the first instruction began, RETI was over), nested_in (interrupts it lay in).
+
+        Raises:
+            UsageError: the program is not watched.
+        """
+        return self._watching().intervals()
+
+    def _watching(self) -> Observer:
+        if self._observer is None:
+            raise UsageError("nobody has watched this board; call observe() before the run that is to be looked at")
+        return self._observer
+
     def snapshot(self) -> UnoSnapshot:
         """Copy everything that decides the further run."""
         return UnoSnapshot(
@@ -314,6 +357,9 @@ class Uno:
         self.serial.restore(snapshot.serial)
         self._edges = list(snapshot.edges)
         self._log_start_cycle, self._log_start_levels = snapshot.log_start_cycle, snapshot.log_start_levels
+        if self._observer is not None:
+            self._observer.begin(self.cycle)
+            self._chip.watch(self._observer)
 
     def _run_to(self, target: int) -> None:
         cause = self._chip.run_to(target)

@@ -14,6 +14,8 @@ from planarm_sim.cpu.layout import (
     ASLEEP,
     BOOT_START,
     CYCLE,
+    ENTERED_AT,
+    ENTERED_VECTOR,
     HORIZON,
     IRQ_EARLIEST,
     NOTHING_CHANGED,
@@ -145,6 +147,8 @@ def take_interrupt(st: State, sram: Bytes, vector: int) -> None:
     """Enter an interrupt: four cycles, four more out of sleep (datasheet, 7.7.1)."""
     st[CYCLE] += ENTRY_CYCLES + (WAKE_CYCLES if st[ASLEEP] else 0)
     st[ASLEEP] = 0
+    st[ENTERED_AT] = st[CYCLE]
+    st[ENTERED_VECTOR] = vector
     push_return(st, sram, int(st[PC]))
     st[SREG_BITS] &= ~I
     if acknowledge(st, vector):

@@ -10,6 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from planarm_sim.cpu.compiled import kernel  # kernel_cache: see there
+from planarm_sim.cpu.interrupts import note_raised, pending_interrupts
 from planarm_sim.cpu.layout import (
     CYCLE,
     HORIZON,
@@ -23,6 +24,7 @@ from planarm_sim.cpu.layout import (
     TIMER0,
     TIMER2,
     TOUCHED,
+    WATCH,
     Bytes,
     State,
 )
@@ -193,7 +195,10 @@ def write_io(st: State, eeprom: Bytes, address: int, value: int) -> None:
     elif address in (GPIOR0, GPIOR1, GPIOR2):
         st[address] = value
     else:
+        before = pending_interrupts(st) if st[WATCH] else 0
         write_rare_io(st, eeprom, address, value, cycle)
+        if st[WATCH]:
+            note_raised(st, before, cycle)
         st[HORIZON] = SOMETHING_CHANGED
 
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import Enum, IntFlag
-from typing import Any, Final
+from typing import Any, Final, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +19,7 @@ from planarm_sim.cpu import queues, service
 from planarm_sim.cpu import registers as reg
 from planarm_sim.cpu.decode import FLASH_BYTES
 from planarm_sim.cpu.dispatch import run
+from planarm_sim.cpu.interrupts import note_raised
 from planarm_sim.cpu.program import Program
 from planarm_sim.cpu.service import stand_still
 from planarm_sim.errors import ImageError, PinError, UsageError
@@ -38,6 +39,7 @@ class StopCause(Enum):
     BREAK = "BREAK instruction"
     BAD_OPCODE = "undefined opcode"
     ASLEEP = "asleep and nothing can wake the chip"
+    BREAKPOINT = "a breakpoint is reached"
 
 
 class ResetCause(IntFlag):
@@ -72,6 +74,7 @@ _STOPS = {
     service.AT_BREAK: StopCause.BREAK,
     service.AT_BAD_OPCODE: StopCause.BAD_OPCODE,
     service.ASLEEP_FOR_EVER: StopCause.ASLEEP,
+    service.TRAPPED: StopCause.BREAKPOINT,
 }
 
 
@@ -99,6 +102,18 @@ class FirstTouch:
     address: int
     register: str
     pc: int
+
+
+class Watcher(Protocol):
+    """What may run the chip in the CPU loop's stead, to see more of it; `planarm_sim.insight` has one."""
+
+    def advance(self, st: at.State, sram: at.Bytes, eeprom: at.Bytes, program: Program, target: int) -> int:
+        """Run as `dispatch.run` does."""
+        ...
+
+    def restart(self, cycle: int) -> None:
+        """The chip is reset at `cycle`."""
+        ...
 
 
 class Chip:
@@ -132,6 +147,7 @@ class Chip:
         state[at.ADC_INPUT : at.ADC_INPUT + at.ADC_INPUTS] = NOT_DRIVEN
         nothing = np.empty(0, dtype=np.int64)
         self._state = queues.allocate(state, (nothing,) * len(queues.ALL))
+        self._watcher: Watcher | None = None
         self.reset(ResetCause.POWER_ON)
 
     # --- Time ----------------------------------------------------------------------------------------------
@@ -165,7 +181,15 @@ class Chip:
             cause = int(stand_still(self._state, self._eeprom, min(halted_until, target)))
             if cause != service.REACHED or self.cycle >= target:
                 return cause
+        if self._watcher is not None:
+            return self._watcher.advance(self._state, self._sram, self._eeprom, self._seen, target)
         return int(run(self._state, self._sram, self._eeprom, self._seen.code, self._seen.flash, target))
+
+    def watch(self, watcher: Watcher | None) -> None:
+        """Have the chip run by `watcher`, or as usual again. Interrupts already pending count as raised now."""
+        self._watcher = watcher
+        self._state[at.WATCH] = watcher is not None
+        note_raised(self._state, 0, self.cycle)
 
     def _look_at_flash(self) -> None:
         """Let the CPU see the flash as it is now, without the RWW section while that is blocked."""
@@ -184,8 +208,14 @@ class Chip:
         st[at.CONSTANTS :] = old[at.CONSTANTS :]
         kept = [at.CYCLE, at.TX_BASE, at.TX_COUNT, at.TX_LIMIT, at.EDGE_BASE, at.EDGE_COUNT, at.EDGE_LIMIT]
         kept += [at.RX_BASE, at.RX_HEAD, at.RX_TAIL, at.IN_BASE, at.IN_HEAD, at.IN_TAIL, at.BOOT_START]
-        kept += [at.BOOT_RESET, *range(at.ADC_INPUT, at.ADC_INPUT + at.ADC_INPUTS)]
-        kept += [at.OUTSIDE_ADDRESS, at.OUTSIDE_PC, *range(at.LEVEL, at.PIPE), *range(at.TOUCHED, at.TOUCHED + 256)]
+        kept += [at.WATCH, at.BOOT_RESET, *range(at.ADC_INPUT, at.ADC_INPUT + at.ADC_INPUTS)]
+        kept += [
+            at.WATCH,
+            at.OUTSIDE_ADDRESS,
+            at.OUTSIDE_PC,
+            *range(at.LEVEL, at.PIPE),
+            *range(at.TOUCHED, at.TOUCHED + 256),
+        ]
         st[kept] = old[kept]
         st[at.OVERRIDE : at.EXTERNAL] = 0
         st[at.DUE : at.DUE + at.DUE_SOURCES] = at.NEVER
@@ -207,6 +237,8 @@ class Chip:
             plan_watchdog(st, now)
         for port in range(3):
             refresh_port(st, port, now)
+        if self._watcher is not None:
+            self._watcher.restart(now)
 
     # --- Serial line -----------------------------------------------------------------------------------------
 
@@ -345,6 +377,7 @@ class Chip:
         self._sram[:] = snapshot.sram
         self._eeprom[:] = snapshot.eeprom
         self._program = snapshot.program
+        self._state[at.WATCH] = self._watcher is not None
         self._look_at_flash()
 
     def unmodelled(self) -> tuple[FirstTouch, ...]:

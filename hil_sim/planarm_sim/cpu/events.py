@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from planarm_sim.cpu.compiled import kernel  # kernel_cache: see there
+from planarm_sim.cpu.interrupts import note_raised, pending_interrupts
 from planarm_sim.cpu.layout import (
     DUE,
     DUE_ADC,
@@ -25,6 +26,7 @@ from planarm_sim.cpu.layout import (
     TIMER0,
     TIMER1,
     TIMER2,
+    WATCH,
     Bytes,
     State,
 )
@@ -55,7 +57,10 @@ def process_events(st: State, eeprom: Bytes, until: int) -> int:
         source = DUE
         while st[source] != due:
             source += 1
+        before = pending_interrupts(st) if st[WATCH] else 0
         happen(st, eeprom, source, due)
+        if st[WATCH]:
+            note_raised(st, before, due)
         st[HORIZON] = SOMETHING_CHANGED  # the CPU loop must look for interrupts at the next instruction
         due = next_event(st)
     return due

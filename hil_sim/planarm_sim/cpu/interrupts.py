@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from planarm_sim.cpu.compiled import kernel  # kernel_cache: see there
-from planarm_sim.cpu.layout import LEVEL, State
+from planarm_sim.cpu.layout import LEVEL, RAISED_AT, State
 from planarm_sim.cpu.registers import (
     ADCSRA,
     EECR,
@@ -73,6 +73,15 @@ def pending_interrupts(st: State) -> int:
     if st[SPMCSR] & (SPMIE | SELFPRGEN) == SPMIE:
         pending |= 1 << SPM_READY
     return int(pending)
+
+
+@kernel
+def note_raised(st: State, before: int, cycle: int) -> None:
+    """Note that the interrupts that are pending now, and were not in the mask `before`, are so since `cycle`."""
+    raised = pending_interrupts(st) & ~before
+    while raised:
+        st[RAISED_AT + lowest_bit(raised)] = cycle
+        raised &= raised - 1
 
 
 @kernel

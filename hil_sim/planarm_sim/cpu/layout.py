@@ -45,6 +45,9 @@ UNKNOWN = -1
     ACCESS_ADDRESS,
     ACCESS_VALUE,
     ACCESS_PC,
+    WATCH,  # 1 while RAISED_AT is kept; see `planarm_sim.insight`
+    ENTERED_AT,  # cycle at which the last interrupt's first instruction began, and its vector
+    ENTERED_VECTOR,
     IVCE_UNTIL,  # last cycle at which IVSEL may be changed
     OUTSIDE_ADDRESS,  # first data address beyond the chip's memory that was used, plus 1
     OUTSIDE_PC,
@@ -105,7 +108,7 @@ UNKNOWN = -1
     IN_HEAD,
     IN_TAIL,
     _CPU_END,
-) = range(256, 256 + 69)
+) = range(256, 256 + 72)
 
 # --- When each source of events is due ----------------------------------------------------------------------
 (
@@ -191,7 +194,11 @@ ADC_INPUT = PAGE_BUFFER + PAGE_WORDS
 """Microvolts on the ADC's eight channels and on AREF, or -1 where nothing outside drives them."""
 ADC_INPUTS = 9
 
-TOUCHED = ADC_INPUT + ADC_INPUTS
+RAISED_AT = ADC_INPUT + ADC_INPUTS
+"""One word per vector: the cycle at which its flag and its enable last came to stand both, while WATCH is 1."""
+VECTORS = 26
+
+TOUCHED = RAISED_AT + VECTORS
 """256 words, one per data address: 1 + PC of the first access when its part is not modelled, else 0."""
 STATE_WORDS = TOUCHED + 256
 """What a snapshot has to copy of the state array; the queues are behind it."""

@@ -27,7 +27,7 @@ from planarm_sim.cpu.layout import (
 
 # Results of `service`: go on, take interrupt vector n (n is 1 to 25), or why the CPU loop ends.
 RUNNING = 0
-REACHED, AT_BREAK, AT_BAD_OPCODE, ASLEEP_FOR_EVER, LOG_FULL, RESET_WANTED, FLASH_WRITE = range(100, 107)
+REACHED, AT_BREAK, AT_BAD_OPCODE, ASLEEP_FOR_EVER, LOG_FULL, RESET_WANTED, FLASH_WRITE, TRAPPED = range(100, 108)
 FIRST_STOP = REACHED
 
 

@@ -9,8 +9,9 @@ from planarm_sim.loader.boot import BootImage, join_bootloader
 from planarm_sim.loader.elf import ELF_MAGIC, parse_elf
 from planarm_sim.loader.image import FLASH_BYTES, Image
 from planarm_sim.loader.intel_hex import parse_hex
+from planarm_sim.loader.symbols import Symbol
 
-__all__ = ["FLASH_BYTES", "BootImage", "Image", "join_bootloader", "load_elf", "load_hex", "load_image"]
+__all__ = ["FLASH_BYTES", "BootImage", "Image", "Symbol", "join_bootloader", "load_elf", "load_hex", "load_image"]
 
 
 def load_hex(path: str | Path) -> Image:

@@ -50,4 +50,5 @@ def join_bootloader(sketch: Image | None, bootloader: Image) -> BootImage:
         )
     flash = sketch.flash[:limit] + bootloader.flash[limit:]
     used = sketch.used_bytes + bootloader.used_bytes
-    return BootImage(Image(flash, used, f"{sketch.source} with {bootloader.source}"), section)
+    symbols = sketch.symbols + bootloader.symbols
+    return BootImage(Image(flash, used, f"{sketch.source} with {bootloader.source}", symbols), section)

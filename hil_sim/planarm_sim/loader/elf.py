@@ -14,6 +14,7 @@ from dataclasses import dataclass
 
 from planarm_sim.errors import ImageError
 from planarm_sim.loader.image import FlashBuilder, Image
+from planarm_sim.loader.symbols import Symbol, function_symbols
 
 __all__ = ["ELF_MAGIC", "parse_elf"]
 
@@ -25,7 +26,7 @@ SECTION_HEADER = struct.Struct("<IIIIIIIIII")
 CLASS_32, LITTLE_ENDIAN, EXECUTABLE = 1, 1, 2
 EM_AVR = 83
 AVR_FAMILY_MASK, AVR5 = 0x7F, 5
-PT_LOAD, SHT_NOBITS = 1, 8
+PT_LOAD, SHT_SYMTAB, SHT_NOBITS = 1, 2, 8
 NOT_FLASH = 0x810000
 """Load addresses from here on are EEPROM, fuses, lock bits and signature."""
 
@@ -37,8 +38,11 @@ DEVICES = (b"atmega328p", b"atmega328")
 @dataclass(frozen=True, slots=True)
 class _Section:
     name: str
+    kind: int
+    flags: int
     offset: int
     size: int
+    link: int
 
 
 def parse_elf(data: bytes, source: str) -> Image:
@@ -77,7 +81,18 @@ def _parse(data: bytes, source: str) -> Image:
     builder = FlashBuilder(source)
     for index in range(program_count):
         _load_segment(data, program_at + index * program_size, sections, builder, source)
-    return builder.build()
+    return builder.build(_symbols(data, sections))
+
+
+def _symbols(data: bytes, sections: list[_Section]) -> tuple[Symbol, ...]:
+    for section in sections:
+        if section.kind == SHT_SYMTAB:
+            names = sections[section.link]
+            table = data[section.offset : section.offset + section.size]
+            return function_symbols(
+                table, data[names.offset : names.offset + names.size], [other.flags for other in sections]
+            )
+    return ()  # stripped
 
 
 def _sections(data: bytes, at: int, size: int, count: int, names_index: int) -> list[_Section]:
@@ -86,9 +101,8 @@ def _sections(data: bytes, at: int, size: int, count: int, names_index: int) -> 
         return []
     names_at = headers[names_index][4]
     return [
-        _Section(_string(data, names_at + header[0]), offset=header[4], size=header[5])
-        for header in headers
-        if header[1] != SHT_NOBITS
+        _Section(_string(data, names_at + name), kind, flags, offset, size if kind != SHT_NOBITS else 0, link)
+        for name, kind, flags, _, offset, size, link, *_ in headers
     ]
 
 

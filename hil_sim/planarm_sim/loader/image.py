@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from planarm_sim.errors import ImageError
+from planarm_sim.loader.symbols import Symbol
 
 __all__ = ["ERASED", "FLASH_BYTES", "FlashBuilder", "Image"]
 
@@ -23,11 +24,13 @@ class Image:
         flash: exactly FLASH_BYTES bytes; bytes that the file does not name are erased.
         used_bytes: number of bytes that the file names.
         source: where the image came from, for messages.
+        symbols: its functions by address; only ELF files tell them.
     """
 
     flash: bytes
     used_bytes: int
     source: str
+    symbols: tuple[Symbol, ...] = ()
 
 
 class FlashBuilder:
@@ -61,7 +64,7 @@ class FlashBuilder:
         self._flash[address:end] = data
         self._owner[address:end] = [place] * len(data)
 
-    def build(self) -> Image:
+    def build(self, symbols: tuple[Symbol, ...] = ()) -> Image:
         """The finished image.
 
         Raises:
@@ -70,4 +73,4 @@ class FlashBuilder:
         used = sum(owner is not None for owner in self._owner)
         if used == 0:
             raise ImageError(f"{self._source}: holds no program bytes")
-        return Image(bytes(self._flash), used, self._source)
+        return Image(bytes(self._flash), used, self._source, symbols)
