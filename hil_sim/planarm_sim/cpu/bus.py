@@ -9,15 +9,16 @@ from __future__ import annotations
 
 import numpy as np
 
-from planarm_sim.cpu.compiled import kernel  # kernel_cache: see there
+from planarm_sim.cpu.compiled import inlined, kernel  # kernel_cache: see there
 from planarm_sim.cpu.interrupts import note_raised, pending_interrupts
 from planarm_sim.cpu.layout import (
+    ACCESS_PC,
+    CHANGES,
     CYCLE,
     HORIZON,
     IVCE_UNTIL,
     OUTSIDE_ADDRESS,
     OUTSIDE_PC,
-    PC,
     SOMETHING_CHANGED,
     SP,
     SREG_BITS,
@@ -29,7 +30,9 @@ from planarm_sim.cpu.layout import (
     State,
 )
 from planarm_sim.cpu.registers import (
+    ADCH,
     ADCL,
+    ADCSRA,
     ADCSRB,
     ADMUX,
     EEARH,
@@ -112,7 +115,7 @@ WRITABLE[[EIMSK, EICRA, PCICR, PCMSK1, SMCR, EEARH]] = (3, 15, 7, 0x7F, 15, 3)
 def touch(st: State, address: int) -> None:
     """Note the first access to a register whose part is not modelled."""
     if st[TOUCHED + address] == 0:
-        st[TOUCHED + address] = st[PC] + 1
+        st[TOUCHED + address] = st[ACCESS_PC] + 1
 
 
 @kernel
@@ -120,35 +123,35 @@ def touch_outside(st: State, address: int) -> None:
     """Note the first access where there is no memory for it."""
     if st[OUTSIDE_ADDRESS] == 0:
         st[OUTSIDE_ADDRESS] = address + 1
-        st[OUTSIDE_PC] = st[PC]
+        st[OUTSIDE_PC] = st[ACCESS_PC]
 
 
-@kernel
-def read_data_space(st: State, sram: Bytes, eeprom: Bytes, address: int) -> int:
+@inlined
+def read_data_space(st: State, memory: Bytes, address: int) -> int:
     """Read one byte; beyond the SRAM there is nothing, which reads as 0 and is noted."""
     if address < SRAM_START:
-        return read_io(st, eeprom, address)
+        return read_io(st, memory, address)
     if address < SRAM_END:
-        return int(sram[address - SRAM_START])
+        return int(memory[address - SRAM_START])
     touch_outside(st, address)
     return 0
 
 
-@kernel
-def write_data_space(st: State, sram: Bytes, eeprom: Bytes, address: int, value: int) -> None:
+@inlined
+def write_data_space(st: State, memory: Bytes, address: int, value: int) -> None:
     """Write one byte."""
     if address < 32:
         st[address] = value
     elif address < SRAM_START:
-        write_io(st, eeprom, address, value)
+        write_io(st, memory, address, value)
     elif address < SRAM_END:
-        sram[address - SRAM_START] = value
+        memory[address - SRAM_START] = value
     else:
         touch_outside(st, address)
 
 
-@kernel
-def read_io(st: State, eeprom: Bytes, address: int) -> int:  # noqa: PLR0911 - one line per part
+@inlined
+def read_io(st: State, memory: Bytes, address: int) -> int:  # noqa: PLR0911 - one line per part
     """Read a general or I/O register (address below 256)."""
     if READS_PLAIN[address]:
         return int(st[address])
@@ -159,6 +162,9 @@ def read_io(st: State, eeprom: Bytes, address: int) -> int:  # noqa: PLR0911 - o
     cycle = st[CYCLE] - 1
     if PINB <= address <= PIND:
         return read_pins(st, (address - PINB) // 3, cycle)
+    if address in (UCSR0A, UCSR0B, PCIFR, EIFR, WDTCSR, SPMCSR, ADCSRA, ADCSRB, ADMUX):
+        return int(st[address])
+    st[CHANGES] += 1  # what follows depends on time, or reading it changes something
     if TCNT1L <= address <= ICR1H:
         return read_timer1(st, address, cycle)
     if address in (TCNT0, TCNT2):
@@ -167,9 +173,7 @@ def read_io(st: State, eeprom: Bytes, address: int) -> int:  # noqa: PLR0911 - o
         return read_timer_flags(st, address, cycle)
     if address == UDR0:
         return read_data(st)
-    if address in (UCSR0A, UCSR0B, PCIFR, EIFR, WDTCSR, SPMCSR):
-        return int(st[address])
-    if ADCL <= address <= ADMUX:
+    if address in (ADCL, ADCH):
         return read_adc(st, address)
     if address == EECR:
         return read_control(st, cycle)
@@ -177,8 +181,8 @@ def read_io(st: State, eeprom: Bytes, address: int) -> int:  # noqa: PLR0911 - o
     return int(st[address])
 
 
-@kernel
-def write_io(st: State, eeprom: Bytes, address: int, value: int) -> None:
+@inlined
+def write_io(st: State, memory: Bytes, address: int, value: int) -> None:
     """Write an I/O register (address 32 to 255)."""
     cycle = st[CYCLE]
     if SPL <= address <= SREG:
@@ -196,7 +200,7 @@ def write_io(st: State, eeprom: Bytes, address: int, value: int) -> None:
         st[address] = value
     else:
         before = pending_interrupts(st) if st[WATCH] else 0
-        write_rare_io(st, eeprom, address, value, cycle)
+        write_rare_io(st, memory, address, value, cycle)
         if st[WATCH]:
             note_raised(st, before, cycle)
         st[HORIZON] = SOMETHING_CHANGED
@@ -214,7 +218,7 @@ def write_cpu_register(st: State, address: int, value: int) -> None:
 
 
 @kernel
-def write_rare_io(st: State, eeprom: Bytes, address: int, value: int, cycle: int) -> None:
+def write_rare_io(st: State, memory: Bytes, address: int, value: int, cycle: int) -> None:
     """Write a register whose effect the CPU loop must look at before its next instruction."""
     if TIFR0 <= address <= TIFR2:
         write_timer_flags(st, address, value, cycle)
@@ -231,7 +235,7 @@ def write_rare_io(st: State, eeprom: Bytes, address: int, value: int, cycle: int
     elif address == MCUSR:
         st[address] &= value
     elif address == EECR:
-        write_control(st, eeprom, value, cycle)
+        write_control(st, memory, value, cycle)
     elif address == WDTCSR:
         write_watchdog(st, value, cycle)
     elif address == GTCCR:

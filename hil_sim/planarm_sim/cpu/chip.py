@@ -24,7 +24,6 @@ from planarm_sim.cpu.program import Program
 from planarm_sim.cpu.service import stand_still
 from planarm_sim.errors import ImageError, PinError, UsageError
 from planarm_sim.peripherals.adc import NOT_DRIVEN, SUPPLY_UV
-from planarm_sim.peripherals.eeprom import EEPROM_BYTES
 from planarm_sim.peripherals.ports import drive_from_outside, refresh_port
 from planarm_sim.peripherals.self_programming import RWWSB, erase_buffer, execute_spm
 from planarm_sim.peripherals.timer_registers import power_up_timers
@@ -83,8 +82,7 @@ class Snapshot:
     """Everything that decides the chip's further run; opaque, made by `Chip.snapshot`."""
 
     state: NDArray[np.int64]
-    sram: NDArray[np.uint8]
-    eeprom: NDArray[np.uint8]
+    memory: NDArray[np.uint8]
     program: Program
     queues: tuple[NDArray[np.int64], ...]
 
@@ -107,7 +105,7 @@ class FirstTouch:
 class Watcher(Protocol):
     """What may run the chip in the CPU loop's stead, to see more of it; `planarm_sim.insight` has one."""
 
-    def advance(self, st: at.State, sram: at.Bytes, eeprom: at.Bytes, program: Program, target: int) -> int:
+    def advance(self, st: at.State, memory: at.Bytes, words: at.State, program: Program, target: int) -> int:
         """Run as `dispatch.run` does."""
         ...
 
@@ -139,8 +137,9 @@ class Chip:
         whole = np.full(FLASH_BYTES, 0xFF, dtype=np.uint8)
         whole[: len(flash)] = np.frombuffer(flash, dtype=np.uint8)
         self._program = self._seen = Program.of(whole, erased_runs=boot_reset)  # _seen: by the CPU, now
-        self._sram = np.zeros(SRAM_BYTES, dtype=np.uint8)
-        self._eeprom = np.full(EEPROM_BYTES, 0xFF, dtype=np.uint8)
+        self._memory = np.full(SRAM_BYTES + reg.EEPROM_BYTES, 0xFF, dtype=np.uint8)
+        self._words = self._memory.view(np.int64)
+        self._sram, self._eeprom = self._memory[:SRAM_BYTES], self._memory[SRAM_BYTES:]
         state = np.zeros(at.QUEUES, dtype=np.int64)
         state[at.BOOT_START] = _FLASH_WORDS - boot_words
         state[at.BOOT_RESET] = boot_reset
@@ -156,6 +155,11 @@ class Chip:
     def cycle(self) -> int:
         """Clock cycles since power-up."""
         return int(self._state[at.CYCLE])
+
+    @property
+    def passed_over(self) -> int:
+        """Cycles of waiting that were not executed one by one (see `idle`), since this object was made."""
+        return int(self._state[at.PASSED_OVER])
 
     def run_to(self, cycle: int) -> StopCause:
         """Run whole instructions until `self.cycle >= cycle`, or until the program stops earlier.
@@ -178,12 +182,12 @@ class Chip:
         """Run, first without the CPU while it stands still; returns one of `service`'s stops."""
         halted_until = int(self._state[at.SPM_HALT_UNTIL])
         if halted_until > self.cycle:
-            cause = int(stand_still(self._state, self._eeprom, min(halted_until, target)))
+            cause = int(stand_still(self._state, self._memory, min(halted_until, target)))
             if cause != service.REACHED or self.cycle >= target:
                 return cause
         if self._watcher is not None:
-            return self._watcher.advance(self._state, self._sram, self._eeprom, self._seen, target)
-        return int(run(self._state, self._sram, self._eeprom, self._seen.code, self._seen.flash, target))
+            return self._watcher.advance(self._state, self._memory, self._words, self._seen, target)
+        return int(run(self._state, self._memory, self._words, self._seen.code, self._seen.flash, target))
 
     def watch(self, watcher: Watcher | None) -> None:
         """Have the chip run by `watcher`, or as usual again. Interrupts already pending count as raised now."""
@@ -369,13 +373,12 @@ class Chip:
         st = self._state
         state = st[: at.STATE_WORDS].copy()
         entries = queues.contents(st)
-        return Snapshot(state, self._sram.copy(), self._eeprom.copy(), self._program, entries)
+        return Snapshot(state, self._memory.copy(), self._program, entries)
 
     def restore(self, snapshot: Snapshot) -> None:
         """Go back to `snapshot`, of this chip or of another with any program; the same run follows."""
         self._state = queues.refill(self._state, snapshot.state, snapshot.queues)
-        self._sram[:] = snapshot.sram
-        self._eeprom[:] = snapshot.eeprom
+        self._memory[:] = snapshot.memory
         self._program = snapshot.program
         self._state[at.WATCH] = self._watcher is not None
         self._look_at_flash()

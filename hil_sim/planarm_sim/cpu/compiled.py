@@ -24,6 +24,17 @@ def kernel(function: F) -> F:
     return cast("F", compiled)
 
 
+def inlined(function: F) -> F:
+    """Compile `function` as `kernel` does, and into each of its callers: for the few on the way of every access.
+
+    An array is seven words to Numba, all of which are handed over at each call that is not inlined.
+    """
+    compiled: Any = kernel(function)
+    if hasattr(compiled, "targetoptions"):
+        compiled.targetoptions["forceinline"] = True
+    return cast("F", compiled)
+
+
 def constant(value: int) -> int:
     """Return `value` as a number for which Numba compiles no version of its own of the functions it is passed to."""
     return cast("int", np.int64(value))

@@ -132,6 +132,7 @@ _TWO_WORDS = (op.LDS, op.STS, op.JUMP3, op.CALL)
 _SKIPS = (op.CPSE, op.SBIC, op.SBIS, op.SBRC, op.SBRS)
 _WIDE = (op.ADIW, op.SBIW)
 _RELATIVE = {op.JUMP2: 12, op.RCALL: 12, op.BRBS: 7, op.BRBC: 7}
+_GOING_BACK = {op.JUMP2: op.JUMP2_BACK, op.BRBS: op.BRBS_BACK, op.BRBC: op.BRBC_BACK}
 _ON_PLAIN_READS = {op.IN: op.MOV, op.SBIC: op.SBRC, op.SBIS: op.SBRS, op.LDS: op.LDS_PLAIN}
 """What to do instead with an I/O register that always reads as last written: it is one more register."""
 _ON_PLAIN_WRITES = {op.OUT: op.MOV, op.STS: op.STS_PLAIN}
@@ -180,10 +181,10 @@ ENCODINGS: tuple[Encoding, ...] = tuple(Encoding.parse(*line) for line in _ENCOD
 def decode(flash: NDArray[np.uint8], *, erased_runs: bool = False) -> NDArray[np.int64]:
     """Decode FLASH_BYTES of program memory; `erased_runs` as in `Program`.
 
-    Returns FLASH_WORDS decoded words and two WRAP words, on which a program lands that runs or skips over the
+    Returns FLASH_WORDS decoded words and three WRAP words, on which a program lands that runs or skips over the
     end of the flash; the program counter starts again at 0 there.
     """
-    code = np.full(FLASH_WORDS + 2, op.WRAP, dtype=np.int64)
+    code = np.full(FLASH_WORDS + 3, op.WRAP, dtype=np.int64)
     code[:FLASH_WORDS] = decode_part(flash, np.arange(FLASH_WORDS), erased_runs=erased_runs)
     return code
 
@@ -203,6 +204,8 @@ def decode_part(flash: NDArray[np.uint8], part: _Words, *, erased_runs: bool) ->
         at = np.nonzero((words & encoding.mask) == encoding.value)[0]
         d, r, k = _operands(encoding, words[at], following[at], places[at])
         operation, d, k = _specialised(encoding.operation, d, r, k)
+        if encoding.operation in _GOING_BACK:
+            operation[k <= places[at]] = _GOING_BACK[encoding.operation]
         code[at] = operation | (d << 8) | (r << 16) | (k << 32)
         if encoding.operation in _TWO_WORDS:
             length[at] = 2

@@ -1,581 +1,515 @@
 """The CPU loop: one flat chain over the operations of decoded instructions.
 
-Program counter, cycle, SREG and stack pointer live in locals. Whatever is not an instruction's own business
-(events, interrupts, I/O) happens at one place, when the cycle has reached the horizon; an instruction that
-accesses I/O notes the access and pulls the horizon in. Cycles: AVR Instruction Set Manual, column AVRe, 16-bit
-program counter.
+Program counter, cycle and SREG live in locals, flags come out of tables. Whatever is not an instruction's own
+business (events, interrupts, I/O) happens at one place, when the cycle has reached LOOK_AT; an instruction that
+accesses I/O notes the access and pulls LOOK_AT in. Each instruction begins as one of one word and one cycle.
+Cycles: AVR Instruction Set Manual, column AVRe, 16-bit program counter.
 """
 
 from __future__ import annotations
 
 from planarm_sim.cpu import access as io
 from planarm_sim.cpu import opcodes as op
-from planarm_sim.cpu.access import access_data, note_access, take_interrupt
+from planarm_sim.cpu.access import look_early, note_access, note_turn
 from planarm_sim.cpu.compiled import kernel  # kernel_cache: see there
-from planarm_sim.cpu.events import process_events
-from planarm_sim.cpu.flags import (
-    KEEP_IT,
-    KEEP_ITH,
-    KEEP_ITHC,
-    C,
-    H,
-    I,
-    N,
-    S,
-    T,
-    V,
-    Z,
-    add_flags,
-    shift_flags,
-    sign_flags,
-    subtract_flags,
-)
+from planarm_sim.cpu.flags import KEEP_IT, KEEP_ITH, KEEP_ITHC, C, H, I, N, S, T, V, Z, sign_flags
 from planarm_sim.cpu.layout import (
-    ACCESS,
-    ACCESS_PC,
+    CARRY_FLAGS,
+    CHANGES,
     CYCLE,
     HORIZON,
     IRQ_EARLIEST,
+    LAST_BACK,
+    LOOK_AT,
     PC,
     PENDING,
+    RESULT_FLAGS,
+    SHIFT_FLAGS,
     SOMETHING_CHANGED,
     SP,
     SREG_BITS,
+    WATCHED,
     Bytes,
     State,
 )
 from planarm_sim.cpu.registers import SRAM_END, SRAM_START
-from planarm_sim.cpu.service import AT_BAD_OPCODE, AT_BREAK, FIRST_STOP, FLASH_WRITE, RUNNING, service
+from planarm_sim.cpu.service import AT_BAD_OPCODE, AT_BREAK, FLASH_WRITE, RUNNING, look_up
 
 PC_MASK = 0x3FFF
+CODE_MASK = 0x7FFF
+"""Covers every place that a program counter can have, so that no index is taken for a negative one."""
 FLASH_MASK = 0x7FFF
+SRAM_BYTES = SRAM_END - SRAM_START
 Z_LOW, Z_HIGH = 30, 31
-LOWEST_PUSH = SRAM_START + 1
-"""A return address that is pushed with SP from here to the end of the SRAM lies in it entirely."""
+LOWEST_PUSH, LOWEST_POP = SRAM_START + 1, SRAM_START - 1
+"""SP from which on a return address lies in the SRAM entirely, when it is pushed and when it is popped."""
 KEEP_PRODUCT = I | T | H | S | V | N
 """What a product leaves alone."""
 
 
 @kernel
-def run(st: State, sram: Bytes, eeprom: Bytes, code: State, flash: Bytes, target: int) -> int:  # noqa: C901, PLR0912, PLR0915
-    """Run whole instructions until `target` is reached or something else ends the loop; returns why."""
+def run(st: State, memory: Bytes, words: State, code: State, flash: Bytes, target: int) -> int:  # noqa: C901, PLR0912, PLR0915
+    """Run whole instructions until `target` is reached or something else ends the loop; returns why.
+
+    `memory` is the SRAM with the EEPROM behind it, `words` the same as int64 words.
+    """
     pc = int(st[PC])
     cycle = int(st[CYCLE])
     sreg = int(st[SREG_BITS])
-    sp = int(st[SP])
-    horizon = cycle
     st[HORIZON] = SOMETHING_CHANGED  # whatever was done to the chip between two runs
+    st[LOOK_AT] = 0
+    st[CHANGES] += 1
     while True:
-        if cycle >= horizon:
+        if cycle >= st[LOOK_AT]:
+            st[PC] = pc
             st[CYCLE] = cycle
             st[SREG_BITS] = sreg
-            st[SP] = sp
-            access = st[ACCESS]
-            if access != io.NOTHING:
-                until = cycle - 1 if access <= io.LAST_READ else cycle
-                if until >= st[HORIZON]:  # no event is due before the horizon
-                    process_events(st, eeprom, until)
-                st[PC] = st[ACCESS_PC]
-                pc = access_data(st, sram, eeprom, pc)
-            st[PC] = pc
-            if st[CYCLE] >= st[HORIZON]:
-                cause = service(st, eeprom, target)
-                while RUNNING < cause < FIRST_STOP:
-                    take_interrupt(st, sram, cause)
-                    cause = service(st, eeprom, target)
-                if cause != RUNNING:
-                    return cause
-                pc = int(st[PC])
+            cause = look_up(st, memory, words, target)
+            if cause != RUNNING:
+                return cause
+            pc = int(st[PC])
             cycle = int(st[CYCLE])
             sreg = int(st[SREG_BITS])
-            sp = int(st[SP])
-            horizon = int(st[HORIZON])
-        word = code[pc]
+        word = code[pc & CODE_MASK]
         operation = word & 0xFF
-        d = (word >> 8) & 0xFF
-        r = (word >> 16) & 0xFFFF
-        k = word >> 32
+        pc += 1
+        cycle += 1
 
-        # --- Arithmetic and logic -------------------------------------------------------------------------
+        # --- What programs do most: arithmetic and logic -----------------------------------------------------
         if operation == op.ADD:
+            d = (word >> 8) & 0xFF
             a = st[d]
-            b = st[r]
-            result = (a + b) & 0xFF
-            st[d] = result
-            sreg = (sreg & KEEP_IT) | add_flags(a, b, result)
-            pc += 1
-            cycle += 1
+            b = st[(word >> 16) & 0xFFFF]
+            total = a + b
+            st[d] = total & 0xFF
+            sreg = (sreg & KEEP_IT) | (st[RESULT_FLAGS + (total & 0xFF)] ^ st[CARRY_FLAGS + ((a ^ b ^ total) & 0x1FF)])
         elif operation == op.ADC:
+            d = (word >> 8) & 0xFF
             a = st[d]
-            b = st[r]
-            result = (a + b + (sreg & C)) & 0xFF
-            st[d] = result
-            sreg = (sreg & KEEP_IT) | add_flags(a, b, result)
-            pc += 1
-            cycle += 1
+            b = st[(word >> 16) & 0xFFFF]
+            total = a + b + (sreg & C)
+            st[d] = total & 0xFF
+            sreg = (sreg & KEEP_IT) | (st[RESULT_FLAGS + (total & 0xFF)] ^ st[CARRY_FLAGS + ((a ^ b ^ total) & 0x1FF)])
         elif operation == op.SUB:
+            d = (word >> 8) & 0xFF
             a = st[d]
-            b = st[r]
-            result = (a - b) & 0xFF
-            st[d] = result
-            sreg = (sreg & KEEP_IT) | subtract_flags(a, b, result)
-            pc += 1
-            cycle += 1
+            b = st[(word >> 16) & 0xFFFF]
+            total = a - b
+            st[d] = total & 0xFF
+            sreg = (sreg & KEEP_IT) | (st[RESULT_FLAGS + (total & 0xFF)] ^ st[CARRY_FLAGS + ((a ^ b ^ total) & 0x1FF)])
         elif operation == op.SBC:
+            d = (word >> 8) & 0xFF
             a = st[d]
-            b = st[r]
-            result = (a - b - (sreg & C)) & 0xFF
-            st[d] = result
-            sreg = (sreg & KEEP_IT) | (subtract_flags(a, b, result) & (sreg | ~Z))
-            pc += 1
-            cycle += 1
+            b = st[(word >> 16) & 0xFFFF]
+            total = a - b - (sreg & C)
+            st[d] = total & 0xFF
+            flags = st[RESULT_FLAGS + (total & 0xFF)] ^ st[CARRY_FLAGS + ((a ^ b ^ total) & 0x1FF)]
+            sreg = (sreg & KEEP_IT) | (flags & (sreg | ~Z))
         elif operation == op.CP:
-            a = st[d]
-            b = st[r]
-            sreg = (sreg & KEEP_IT) | subtract_flags(a, b, (a - b) & 0xFF)
-            pc += 1
-            cycle += 1
+            a = st[(word >> 8) & 0xFF]
+            b = st[(word >> 16) & 0xFFFF]
+            total = a - b
+            sreg = (sreg & KEEP_IT) | (st[RESULT_FLAGS + (total & 0xFF)] ^ st[CARRY_FLAGS + ((a ^ b ^ total) & 0x1FF)])
         elif operation == op.CPC:
-            a = st[d]
-            b = st[r]
-            result = (a - b - (sreg & C)) & 0xFF
-            sreg = (sreg & KEEP_IT) | (subtract_flags(a, b, result) & (sreg | ~Z))
-            pc += 1
-            cycle += 1
+            a = st[(word >> 8) & 0xFF]
+            b = st[(word >> 16) & 0xFFFF]
+            total = a - b - (sreg & C)
+            flags = st[RESULT_FLAGS + (total & 0xFF)] ^ st[CARRY_FLAGS + ((a ^ b ^ total) & 0x1FF)]
+            sreg = (sreg & KEEP_IT) | (flags & (sreg | ~Z))
         elif operation == op.AND:
-            result = st[d] & st[r]
+            d = (word >> 8) & 0xFF
+            result = st[d] & st[(word >> 16) & 0xFFFF]
             st[d] = result
-            sreg = (sreg & KEEP_ITHC) | sign_flags(result, 0)
-            pc += 1
-            cycle += 1
+            sreg = (sreg & KEEP_ITHC) | st[RESULT_FLAGS + (result & 0xFF)]
         elif operation == op.OR:
-            result = st[d] | st[r]
+            d = (word >> 8) & 0xFF
+            result = st[d] | st[(word >> 16) & 0xFFFF]
             st[d] = result
-            sreg = (sreg & KEEP_ITHC) | sign_flags(result, 0)
-            pc += 1
-            cycle += 1
+            sreg = (sreg & KEEP_ITHC) | st[RESULT_FLAGS + (result & 0xFF)]
         elif operation == op.EOR:
-            result = st[d] ^ st[r]
+            d = (word >> 8) & 0xFF
+            result = st[d] ^ st[(word >> 16) & 0xFFFF]
             st[d] = result
-            sreg = (sreg & KEEP_ITHC) | sign_flags(result, 0)
-            pc += 1
-            cycle += 1
-        elif operation == op.COM:
-            result = 0xFF - st[d]
-            st[d] = result
-            sreg = (sreg & KEEP_ITH) | sign_flags(result, 0) | C
-            pc += 1
-            cycle += 1
-        elif operation == op.NEG:
-            b = st[d]
-            result = -b & 0xFF
-            st[d] = result
-            sreg = (sreg & KEEP_IT) | subtract_flags(0, b, result)
-            pc += 1
-            cycle += 1
+            sreg = (sreg & KEEP_ITHC) | st[RESULT_FLAGS + (result & 0xFF)]
         elif operation == op.INC:
+            d = (word >> 8) & 0xFF
             result = (st[d] + 1) & 0xFF
             st[d] = result
-            sreg = (sreg & KEEP_ITHC) | sign_flags(result, 1 if result == 0x80 else 0)
-            pc += 1
-            cycle += 1
+            sreg = (sreg & KEEP_ITHC) | (st[RESULT_FLAGS + result] ^ (V | S if result == 0x80 else 0))
         elif operation == op.DEC:
+            d = (word >> 8) & 0xFF
             result = (st[d] - 1) & 0xFF
             st[d] = result
-            sreg = (sreg & KEEP_ITHC) | sign_flags(result, 1 if result == 0x7F else 0)
-            pc += 1
-            cycle += 1
+            sreg = (sreg & KEEP_ITHC) | (st[RESULT_FLAGS + result] ^ (V | S if result == 0x7F else 0))
         elif operation == op.LSR:
+            d = (word >> 8) & 0xFF
             a = st[d]
-            result = a >> 1
-            st[d] = result
-            sreg = (sreg & KEEP_ITH) | shift_flags(result, a & 1)
-            pc += 1
-            cycle += 1
+            st[d] = a >> 1
+            sreg = (sreg & KEEP_ITH) | st[SHIFT_FLAGS + (a & 0x1FF)]
         elif operation == op.ROR:
-            a = st[d]
-            result = (a >> 1) | ((sreg & C) << 7)
-            st[d] = result
-            sreg = (sreg & KEEP_ITH) | shift_flags(result, a & 1)
-            pc += 1
-            cycle += 1
-        elif operation == op.ASR:
-            a = st[d]
-            result = (a >> 1) | (a & 0x80)
-            st[d] = result
-            sreg = (sreg & KEEP_ITH) | shift_flags(result, a & 1)
-            pc += 1
-            cycle += 1
+            d = (word >> 8) & 0xFF
+            a = st[d] | ((sreg & C) << 8)
+            st[d] = a >> 1
+            sreg = (sreg & KEEP_ITH) | st[SHIFT_FLAGS + (a & 0x1FF)]
         elif operation == op.SWAP:
+            d = (word >> 8) & 0xFF
             a = st[d]
             st[d] = (a >> 4) | ((a & 15) << 4)
-            pc += 1
-            cycle += 1
         elif operation == op.ADIW:
+            d = (word >> 8) & 0xFF
             before = st[d] | (st[d + 1] << 8)
-            after = (before + r) & 0xFFFF
+            after = (before + ((word >> 16) & 0xFFFF)) & 0xFFFF
             st[d] = after & 0xFF
             st[d + 1] = after >> 8
             wide = sign_flags(after >> 8, (~before & after) >> 15) & ~Z
             sreg = (sreg & KEEP_ITH) | wide | ((before & ~after) >> 15) | (Z if after == 0 else 0)
-            pc += 1
-            cycle += 2
+            cycle += 1
         elif operation == op.SBIW:
+            d = (word >> 8) & 0xFF
             before = st[d] | (st[d + 1] << 8)
-            after = (before - r) & 0xFFFF
+            after = (before - ((word >> 16) & 0xFFFF)) & 0xFFFF
             st[d] = after & 0xFF
             st[d + 1] = after >> 8
             wide = sign_flags(after >> 8, (before & ~after) >> 15) & ~Z
             sreg = (sreg & KEEP_ITH) | wide | ((~before & after) >> 15) | (Z if after == 0 else 0)
+            cycle += 1
+
+        # --- Moves, loads and stores -------------------------------------------------------------------------
+        elif operation == op.MOV:
+            st[(word >> 8) & 0xFF] = st[(word >> 16) & 0xFFFF]
+        elif operation == op.MOVW:
+            d = (word >> 8) & 0xFF
+            r = (word >> 16) & 0xFFFF
+            st[d] = st[r]
+            st[d + 1] = st[r + 1]
+        elif operation == op.LDD:
+            r = (word >> 16) & 0xFFFF
+            address = (st[r] + (st[r + 1] << 8) + (word >> 32)) & 0xFFFF
+            offset = address - SRAM_START
+            if 0 <= offset < SRAM_BYTES:
+                st[(word >> 8) & 0xFF] = memory[offset]
+            else:
+                note_access(st, io.READ, address, (word >> 8) & 0xFF, pc - 1)
+            cycle += 1
+        elif operation == op.STD:
+            r = (word >> 16) & 0xFFFF
+            address = (st[r] + (st[r + 1] << 8) + (word >> 32)) & 0xFFFF
+            value = st[(word >> 8) & 0xFF]
+            offset = address - SRAM_START
+            if 0 <= offset < SRAM_BYTES:
+                memory[offset] = value
+            else:
+                note_access(st, io.WRITE, address, value, pc - 1)
+            cycle += 1
+        elif operation == op.LD_INC:
+            r = (word >> 16) & 0xFFFF
+            address = st[r] | (st[r + 1] << 8)
+            st[r] = (address + 1) & 0xFF
+            st[r + 1] = ((address + 1) >> 8) & 0xFF
+            offset = address - SRAM_START
+            if 0 <= offset < SRAM_BYTES:
+                st[(word >> 8) & 0xFF] = memory[offset]
+            else:
+                note_access(st, io.READ, address, (word >> 8) & 0xFF, pc - 1)
+            cycle += 1
+        elif operation == op.ST_INC:
+            r = (word >> 16) & 0xFFFF
+            address = st[r] | (st[r + 1] << 8)
+            value = st[(word >> 8) & 0xFF]
+            st[r] = (address + 1) & 0xFF
+            st[r + 1] = ((address + 1) >> 8) & 0xFF
+            offset = address - SRAM_START
+            if 0 <= offset < SRAM_BYTES:
+                memory[offset] = value
+            else:
+                note_access(st, io.WRITE, address, value, pc - 1)
+            cycle += 1
+        elif operation == op.LDS:
+            address = word >> 32
+            offset = address - SRAM_START
+            if 0 <= offset < SRAM_BYTES:
+                st[(word >> 8) & 0xFF] = memory[offset]
+            else:
+                note_access(st, io.READ, address, (word >> 8) & 0xFF, pc - 1)
             pc += 1
+            cycle += 1
+        elif operation == op.STS:
+            address = word >> 32
+            value = st[(word >> 8) & 0xFF]
+            offset = address - SRAM_START
+            if 0 <= offset < SRAM_BYTES:
+                memory[offset] = value
+            else:
+                note_access(st, io.WRITE, address, value, pc - 1)
+            pc += 1
+            cycle += 1
+        elif operation == op.LDS_PLAIN:
+            st[(word >> 8) & 0xFF] = st[(word >> 32) & 0xFFFF]
+            pc += 1
+            cycle += 1
+        elif operation == op.STS_PLAIN:
+            st[(word >> 32) & 0xFFFF] = st[(word >> 8) & 0xFF]
+            pc += 1
+            cycle += 1
+        elif operation == op.POP:
+            address = (st[SP] + 1) & 0xFFFF
+            st[SP] = address
+            offset = address - SRAM_START
+            if 0 <= offset < SRAM_BYTES:
+                st[(word >> 8) & 0xFF] = memory[offset]
+            else:
+                note_access(st, io.READ, address, (word >> 8) & 0xFF, pc - 1)
+            cycle += 1
+        elif operation == op.PUSH:
+            address = st[SP]
+            st[SP] = (address - 1) & 0xFFFF
+            value = st[(word >> 8) & 0xFF]
+            offset = address - SRAM_START
+            if 0 <= offset < SRAM_BYTES:
+                memory[offset] = value
+            else:
+                note_access(st, io.WRITE, address, value, pc - 1)
+            cycle += 1
+
+        # --- Jumps, calls, branches and skips ----------------------------------------------------------------
+        elif operation == op.BRBS:
+            if sreg & (word >> 8) & 0xFF:
+                pc = word >> 32
+                cycle += 1
+        elif operation == op.BRBC:
+            if sreg & (word >> 8) & 0xFF == 0:
+                pc = word >> 32
+                cycle += 1
+        elif operation == op.BRBS_BACK:
+            if sreg & (word >> 8) & 0xFF:
+                pc = word >> 32
+                cycle += 1
+                st[LAST_BACK] = pc
+                if pc == st[WATCHED]:
+                    note_turn(st)
+        elif operation == op.BRBC_BACK:
+            if sreg & (word >> 8) & 0xFF == 0:
+                pc = word >> 32
+                cycle += 1
+                st[LAST_BACK] = pc
+                if pc == st[WATCHED]:
+                    note_turn(st)
+        elif operation == op.JUMP2:
+            pc = word >> 32
+            cycle += 1
+        elif operation == op.JUMP2_BACK:
+            pc = word >> 32
+            cycle += 1
+            st[LAST_BACK] = pc
+            if pc == st[WATCHED]:
+                note_turn(st)
+        elif operation == op.JUMP3:
+            back = word >> 32 < pc
+            pc = word >> 32
             cycle += 2
+            if back:
+                st[LAST_BACK] = pc
+                if pc == st[WATCHED]:
+                    note_turn(st)
+        elif operation == op.RCALL:
+            place = st[SP] - LOWEST_PUSH
+            if 0 <= place < SRAM_BYTES - 1:
+                memory[place + 1] = pc & 0xFF
+                memory[place] = pc >> 8
+                st[SP] -= 2
+            else:
+                note_access(st, io.CALL, pc, pc, pc - 1)
+            pc = word >> 32
+            cycle += 2
+        elif operation == op.CALL:
+            place = st[SP] - LOWEST_PUSH
+            if 0 <= place < SRAM_BYTES - 1:
+                memory[place + 1] = (pc + 1) & 0xFF
+                memory[place] = (pc + 1) >> 8
+                st[SP] -= 2
+            else:
+                note_access(st, io.CALL, pc, pc + 1, pc - 1)
+            pc = word >> 32
+            cycle += 3
+        elif operation == op.RET:
+            place = st[SP] - LOWEST_POP
+            if 0 <= place < SRAM_BYTES - 1:
+                pc = ((int(memory[place]) << 8) | int(memory[place + 1])) & PC_MASK
+                st[SP] += 2
+            else:
+                note_access(st, io.RETURN, pc, pc, pc - 1)
+            cycle += 3
+        elif operation == op.RETI:
+            place = st[SP] - LOWEST_POP
+            if 0 <= place < SRAM_BYTES - 1:
+                pc = ((int(memory[place]) << 8) | int(memory[place + 1])) & PC_MASK
+                st[SP] += 2
+            else:
+                note_access(st, io.RETURN, pc, pc, pc - 1)
+            cycle += 3
+            sreg |= I
+            st[IRQ_EARLIEST] = cycle + 1
+            if st[PENDING] != 0:
+                look_early(st, cycle + 1)
+        elif operation == op.CPSE:
+            if st[(word >> 8) & 0xFF] == st[(word >> 16) & 0xFFFF]:
+                pc += word >> 32
+                cycle += word >> 32
+        elif operation == op.SBRC:
+            if st[(word >> 8) & 0xFF] & (word >> 16) & 0xFFFF == 0:
+                pc += word >> 32
+                cycle += word >> 32
+        elif operation == op.SBRS:
+            if st[(word >> 8) & 0xFF] & (word >> 16) & 0xFFFF:
+                pc += word >> 32
+                cycle += word >> 32
+
+        # --- I/O and SREG ------------------------------------------------------------------------------------
+        elif operation == op.IN:
+            note_access(st, io.READ, (word >> 16) & 0xFFFF, (word >> 8) & 0xFF, pc - 1)
+        elif operation == op.OUT:
+            note_access(st, io.WRITE, (word >> 8) & 0xFF, st[(word >> 16) & 0xFFFF], pc - 1)
+        elif operation == op.IN_SREG:
+            st[(word >> 8) & 0xFF] = sreg
+        elif operation == op.OUT_SREG:
+            value = st[(word >> 16) & 0xFFFF]
+            if value & I and not sreg & I:
+                st[IRQ_EARLIEST] = cycle + 1
+                if st[PENDING] != 0:
+                    look_early(st, cycle + 1)
+            sreg = value
+        elif operation == op.SBI:
+            note_access(st, io.SET_BIT, (word >> 8) & 0xFF, (word >> 16) & 0xFFFF, pc - 1)
+            cycle += 1
+        elif operation == op.CBI:
+            note_access(st, io.CLEAR_BIT, (word >> 8) & 0xFF, (word >> 16) & 0xFFFF, pc - 1)
+            cycle += 1
+        elif operation == op.BSET:
+            d = (word >> 8) & 0xFF
+            sreg |= d
+            if d == I:
+                st[IRQ_EARLIEST] = cycle + 1
+                if st[PENDING] != 0:
+                    look_early(st, cycle + 1)
+        elif operation == op.BCLR:
+            sreg &= ~((word >> 8) & 0xFF)
+        elif operation == op.SBIC:
+            note_access(st, io.SKIP_CLEAR, (word >> 8) & 0xFF, ((word >> 16) & 0xFFFF) | (word >> 32 << 8), pc - 1)
+        elif operation == op.SBIS:
+            note_access(st, io.SKIP_SET, (word >> 8) & 0xFF, ((word >> 16) & 0xFFFF) | (word >> 32 << 8), pc - 1)
+
+        # --- What programs do less ---------------------------------------------------------------------------
+        elif operation == op.COM:
+            d = (word >> 8) & 0xFF
+            result = st[d] ^ 0xFF
+            st[d] = result
+            sreg = (sreg & KEEP_ITH) | st[RESULT_FLAGS + (result & 0xFF)] | C
+        elif operation == op.NEG:
+            d = (word >> 8) & 0xFF
+            b = st[d]
+            total = -b
+            st[d] = total & 0xFF
+            sreg = (sreg & KEEP_IT) | (st[RESULT_FLAGS + (total & 0xFF)] ^ st[CARRY_FLAGS + ((b ^ total) & 0x1FF)])
+        elif operation == op.ASR:
+            d = (word >> 8) & 0xFF
+            a = st[d]
+            a |= (a & 0x80) << 1
+            st[d] = a >> 1
+            sreg = (sreg & KEEP_ITH) | st[SHIFT_FLAGS + (a & 0x1FF)]
         elif operation == op.MUL:
-            product = st[d] * st[r]
+            product = st[(word >> 8) & 0xFF] * st[(word >> 16) & 0xFFFF]
             st[0] = product & 0xFF
             st[1] = product >> 8
             sreg = (sreg & KEEP_PRODUCT) | (product >> 15) | (Z if product == 0 else 0)
-            pc += 1
-            cycle += 2
+            cycle += 1
         elif operation == op.MULX:
-            a = st[d]
-            b = st[r]
-            if k & op.D_SIGNED:
+            a = st[(word >> 8) & 0xFF]
+            b = st[(word >> 16) & 0xFFFF]
+            kind = word >> 32
+            if kind & op.D_SIGNED:
                 a = (a ^ 0x80) - 0x80
-            if k & op.R_SIGNED:
+            if kind & op.R_SIGNED:
                 b = (b ^ 0x80) - 0x80
             product = (a * b) & 0xFFFF
             carry = product >> 15
-            if k & op.FRACTIONAL:
+            if kind & op.FRACTIONAL:
                 product = (product << 1) & 0xFFFF
             st[0] = product & 0xFF
             st[1] = product >> 8
             sreg = (sreg & KEEP_PRODUCT) | carry | (Z if product == 0 else 0)
-            pc += 1
-            cycle += 2
-
-        # --- Moves, loads and stores ----------------------------------------------------------------------
-        elif operation == op.MOV:
-            st[d] = st[r]
-            pc += 1
             cycle += 1
-        elif operation == op.MOVW:
-            st[d] = st[r]
-            st[d + 1] = st[r + 1]
-            pc += 1
-            cycle += 1
-        elif operation == op.LDD:
-            address = (st[r] + (st[r + 1] << 8) + k) & 0xFFFF
-            if SRAM_START <= address < SRAM_END:
-                st[d] = sram[address - SRAM_START]
-            else:
-                note_access(st, io.READ, address, d, pc)
-                horizon = 0
-            pc += 1
-            cycle += 2
-        elif operation == op.STD:
-            address = (st[r] + (st[r + 1] << 8) + k) & 0xFFFF
-            value = st[d]
-            if SRAM_START <= address < SRAM_END:
-                sram[address - SRAM_START] = value
-            else:
-                note_access(st, io.WRITE, address, value, pc)
-                horizon = 0
-            pc += 1
-            cycle += 2
-        elif operation == op.LD_INC:
-            address = st[r] + (st[r + 1] << 8)
-            st[r] = (address + 1) & 0xFF
-            st[r + 1] = ((address + 1) >> 8) & 0xFF
-            if SRAM_START <= address < SRAM_END:
-                st[d] = sram[address - SRAM_START]
-            else:
-                note_access(st, io.READ, address, d, pc)
-                horizon = 0
-            pc += 1
-            cycle += 2
-        elif operation == op.LD_DEC:
-            address = (st[r] + (st[r + 1] << 8) - 1) & 0xFFFF
-            st[r] = address & 0xFF
-            st[r + 1] = address >> 8
-            if SRAM_START <= address < SRAM_END:
-                st[d] = sram[address - SRAM_START]
-            else:
-                note_access(st, io.READ, address, d, pc)
-                horizon = 0
-            pc += 1
-            cycle += 2
-        elif operation == op.ST_INC:
-            address = st[r] + (st[r + 1] << 8)
-            value = st[d]
-            st[r] = (address + 1) & 0xFF
-            st[r + 1] = ((address + 1) >> 8) & 0xFF
-            if SRAM_START <= address < SRAM_END:
-                sram[address - SRAM_START] = value
-            else:
-                note_access(st, io.WRITE, address, value, pc)
-                horizon = 0
-            pc += 1
-            cycle += 2
-        elif operation == op.ST_DEC:
-            address = (st[r] + (st[r + 1] << 8) - 1) & 0xFFFF
-            value = st[d]
-            st[r] = address & 0xFF
-            st[r + 1] = address >> 8
-            if SRAM_START <= address < SRAM_END:
-                sram[address - SRAM_START] = value
-            else:
-                note_access(st, io.WRITE, address, value, pc)
-                horizon = 0
-            pc += 1
-            cycle += 2
-        elif operation == op.LDS:
-            address = k
-            if SRAM_START <= address < SRAM_END:
-                st[d] = sram[address - SRAM_START]
-            else:
-                note_access(st, io.READ, address, d, pc)
-                horizon = 0
-            pc += 2
-            cycle += 2
-        elif operation == op.STS:
-            address = k
-            value = st[d]
-            if SRAM_START <= address < SRAM_END:
-                sram[address - SRAM_START] = value
-            else:
-                note_access(st, io.WRITE, address, value, pc)
-                horizon = 0
-            pc += 2
-            cycle += 2
-        elif operation == op.LDS_PLAIN:
-            st[d] = st[k]
-            pc += 2
-            cycle += 2
-        elif operation == op.STS_PLAIN:
-            st[k] = st[d]
-            pc += 2
-            cycle += 2
         elif operation == op.LPM:
-            st[d] = flash[(st[Z_LOW] | (st[Z_HIGH] << 8)) & FLASH_MASK]
-            pc += 1
-            cycle += 3
+            st[(word >> 8) & 0xFF] = flash[(st[Z_LOW] | (st[Z_HIGH] << 8)) & FLASH_MASK]
+            cycle += 2
         elif operation == op.LPM_INC:
             address = st[Z_LOW] | (st[Z_HIGH] << 8)
             st[Z_LOW] = (address + 1) & 0xFF
             st[Z_HIGH] = ((address + 1) >> 8) & 0xFF
-            st[d] = flash[address & FLASH_MASK]
-            pc += 1
-            cycle += 3
-        elif operation == op.POP:
-            sp = (sp + 1) & 0xFFFF
-            if SRAM_START <= sp < SRAM_END:
-                st[d] = sram[sp - SRAM_START]
+            st[(word >> 8) & 0xFF] = flash[address & FLASH_MASK]
+            cycle += 2
+        elif operation == op.LD_DEC:
+            r = (word >> 16) & 0xFFFF
+            address = ((st[r] | (st[r + 1] << 8)) - 1) & 0xFFFF
+            st[r] = address & 0xFF
+            st[r + 1] = address >> 8
+            offset = address - SRAM_START
+            if 0 <= offset < SRAM_BYTES:
+                st[(word >> 8) & 0xFF] = memory[offset]
             else:
-                note_access(st, io.READ, sp, d, pc)
-                horizon = 0
-            pc += 1
-            cycle += 2
-        elif operation == op.PUSH:
-            address = sp
-            value = st[d]
-            sp = (sp - 1) & 0xFFFF
-            if SRAM_START <= address < SRAM_END:
-                sram[address - SRAM_START] = value
+                note_access(st, io.READ, address, (word >> 8) & 0xFF, pc - 1)
+            cycle += 1
+        elif operation == op.ST_DEC:
+            r = (word >> 16) & 0xFFFF
+            address = ((st[r] | (st[r + 1] << 8)) - 1) & 0xFFFF
+            value = st[(word >> 8) & 0xFF]
+            st[r] = address & 0xFF
+            st[r + 1] = address >> 8
+            offset = address - SRAM_START
+            if 0 <= offset < SRAM_BYTES:
+                memory[offset] = value
             else:
-                note_access(st, io.WRITE, address, value, pc)
-                horizon = 0
-            pc += 1
-            cycle += 2
-
-        # --- I/O ------------------------------------------------------------------------------------------
-        elif operation == op.IN:
-            note_access(st, io.READ, r, d, pc)
-            horizon = 0
-            pc += 1
-            cycle += 1
-        elif operation == op.OUT:
-            note_access(st, io.WRITE, d, st[r], pc)
-            horizon = 0
-            pc += 1
-            cycle += 1
-        elif operation == op.IN_SREG:
-            st[d] = sreg
-            pc += 1
-            cycle += 1
-        elif operation == op.OUT_SREG:
-            value = st[r]
-            pc += 1
-            cycle += 1
-            if value & I and not sreg & I:
-                st[IRQ_EARLIEST] = cycle + 1
-                if st[PENDING] != 0:
-                    st[HORIZON] = min(st[HORIZON], cycle + 1)
-                    horizon = min(horizon, cycle + 1)
-            sreg = value
-        elif operation == op.CBI:
-            note_access(st, io.CLEAR_BIT, d, r, pc)
-            horizon = 0
-            pc += 1
-            cycle += 2
-        elif operation == op.SBI:
-            note_access(st, io.SET_BIT, d, r, pc)
-            horizon = 0
-            pc += 1
-            cycle += 2
-        elif operation == op.SBIC:
-            note_access(st, io.SKIP_CLEAR, d, r | (k << 8), pc)
-            horizon = 0
-            pc += 1
-            cycle += 1
-        elif operation == op.SBIS:
-            note_access(st, io.SKIP_SET, d, r | (k << 8), pc)
-            horizon = 0
-            pc += 1
-            cycle += 1
-
-        # --- Bits -----------------------------------------------------------------------------------------
-        elif operation == op.BSET:
-            sreg |= d
-            pc += 1
-            cycle += 1
-            if d == I:
-                st[IRQ_EARLIEST] = cycle + 1
-                if st[PENDING] != 0:
-                    st[HORIZON] = min(st[HORIZON], cycle + 1)
-                    horizon = min(horizon, cycle + 1)
-        elif operation == op.BCLR:
-            sreg &= ~d
-            pc += 1
+                note_access(st, io.WRITE, address, value, pc - 1)
             cycle += 1
         elif operation == op.BLD:
+            d = (word >> 8) & 0xFF
+            r = (word >> 16) & 0xFFFF
             st[d] = (st[d] | r) if sreg & T else (st[d] & ~r)
-            pc += 1
-            cycle += 1
         elif operation == op.BST:
-            sreg = (sreg | T) if st[d] & r else (sreg & ~T)
-            pc += 1
-            cycle += 1
-
-        # --- Jumps, calls, branches and skips -------------------------------------------------------------
-        elif operation == op.JUMP2:
-            pc = k
-            cycle += 2
-        elif operation == op.JUMP3:
-            pc = k
-            cycle += 3
+            sreg = (sreg | T) if st[(word >> 8) & 0xFF] & (word >> 16) & 0xFFFF else (sreg & ~T)
         elif operation == op.IJMP:
             pc = (st[Z_LOW] | (st[Z_HIGH] << 8)) & PC_MASK
-            cycle += 2
-        elif operation == op.RCALL:
-            if LOWEST_PUSH <= sp < SRAM_END:
-                sram[sp - SRAM_START] = (pc + 1) & 0xFF
-                sram[sp - LOWEST_PUSH] = (pc + 1) >> 8
-                sp -= 2
-            else:
-                note_access(st, io.CALL, sp, pc + 1, pc)
-                horizon = 0
-            pc = k
-            cycle += 3
-        elif operation == op.CALL:
-            if LOWEST_PUSH <= sp < SRAM_END:
-                sram[sp - SRAM_START] = (pc + 2) & 0xFF
-                sram[sp - LOWEST_PUSH] = (pc + 2) >> 8
-                sp -= 2
-            else:
-                note_access(st, io.CALL, sp, pc + 2, pc)
-                horizon = 0
-            pc = k
-            cycle += 4
+            cycle += 1
         elif operation == op.ICALL:
-            if LOWEST_PUSH <= sp < SRAM_END:
-                sram[sp - SRAM_START] = (pc + 1) & 0xFF
-                sram[sp - LOWEST_PUSH] = (pc + 1) >> 8
-                sp -= 2
+            place = st[SP] - LOWEST_PUSH
+            if 0 <= place < SRAM_BYTES - 1:
+                memory[place + 1] = pc & 0xFF
+                memory[place] = pc >> 8
+                st[SP] -= 2
             else:
-                note_access(st, io.CALL, sp, pc + 1, pc)
-                horizon = 0
+                note_access(st, io.CALL, pc, pc, pc - 1)
             pc = (st[Z_LOW] | (st[Z_HIGH] << 8)) & PC_MASK
-            cycle += 3
-        elif operation == op.RET:
-            if LOWEST_PUSH <= sp + 2 < SRAM_END:
-                pc = ((int(sram[sp + 1 - SRAM_START]) << 8) | int(sram[sp + 2 - SRAM_START])) & PC_MASK
-                sp += 2
-            else:
-                note_access(st, io.RETURN, pc, pc, pc)
-                horizon = 0
-            cycle += 4
-        elif operation == op.RETI:
-            if LOWEST_PUSH <= sp + 2 < SRAM_END:
-                pc = ((int(sram[sp + 1 - SRAM_START]) << 8) | int(sram[sp + 2 - SRAM_START])) & PC_MASK
-                sp += 2
-            else:
-                note_access(st, io.RETURN, pc, pc, pc)
-                horizon = 0
-            sreg |= I
-            cycle += 4
-            st[IRQ_EARLIEST] = cycle + 1
-            if st[PENDING] != 0:
-                st[HORIZON] = min(st[HORIZON], cycle + 1)
-                horizon = min(horizon, cycle + 1)
-        elif operation == op.BRBS:
-            if sreg & d:
-                pc = k
-                cycle += 2
-            else:
-                pc += 1
-                cycle += 1
-        elif operation == op.BRBC:
-            if sreg & d:
-                pc += 1
-                cycle += 1
-            else:
-                pc = k
-                cycle += 2
-        elif operation == op.CPSE:
-            if st[d] == st[r]:
-                pc += k
-                cycle += k
-            pc += 1
-            cycle += 1
-        elif operation == op.SBRC:
-            if st[d] & r == 0:
-                pc += k
-                cycle += k
-            pc += 1
-            cycle += 1
-        elif operation == op.SBRS:
-            if st[d] & r:
-                pc += k
-                cycle += k
-            pc += 1
-            cycle += 1
+            cycle += 2
 
-        # --- The chip itself ------------------------------------------------------------------------------
+        # --- The chip itself ---------------------------------------------------------------------------------
         elif operation == op.NOP:
-            pc += 1
-            cycle += 1
+            pass
         elif operation == op.WRAP:
-            pc &= PC_MASK
+            pc = (pc - 1) & PC_MASK
+            cycle -= 1
         elif operation == op.SLEEP:
-            note_access(st, io.SLEEP, pc, pc, pc)
-            horizon = 0
-            pc += 1
-            cycle += 1
+            note_access(st, io.SLEEP, pc, pc, pc - 1)
         elif operation == op.WDR:
-            note_access(st, io.RESTART_WATCHDOG, pc, pc, pc)
-            horizon = 0
-            pc += 1
-            cycle += 1
+            note_access(st, io.RESTART_WATCHDOG, pc, pc, pc - 1)
         else:
             cause = AT_BAD_OPCODE
             if operation == op.BREAK:
                 cause = AT_BREAK
-                pc += 1
-                cycle += 1
-            elif operation == op.SPM:
-                cause = FLASH_WRITE
+            else:
+                pc -= 1
+                cycle -= 1
+                if operation == op.SPM:
+                    cause = FLASH_WRITE
             st[PC] = pc
             st[CYCLE] = cycle
             st[SREG_BITS] = sreg
-            st[SP] = sp
             return cause

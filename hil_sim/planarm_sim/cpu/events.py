@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from planarm_sim.cpu.compiled import kernel  # kernel_cache: see there
+from planarm_sim.cpu.compiled import inlined, kernel  # kernel_cache: see there
 from planarm_sim.cpu.interrupts import note_raised, pending_interrupts
 from planarm_sim.cpu.layout import (
     DUE,
@@ -40,7 +40,7 @@ from planarm_sim.peripherals.usart import end_frame, receive_event
 from planarm_sim.peripherals.watchdog import watchdog_timeout
 
 
-@kernel
+@inlined
 def next_event(st: State) -> int:
     """Cycle of the earliest event of all sources."""
     due = st[DUE]
@@ -49,8 +49,8 @@ def next_event(st: State) -> int:
     return int(due)
 
 
-@kernel
-def process_events(st: State, eeprom: Bytes, until: int) -> int:
+@inlined
+def process_events(st: State, memory: Bytes, until: int) -> int:
     """Let happen what is due up to and including the cycle `until`; return when the next event is due."""
     due = next_event(st)
     while due <= until:
@@ -58,7 +58,7 @@ def process_events(st: State, eeprom: Bytes, until: int) -> int:
         while st[source] != due:
             source += 1
         before = pending_interrupts(st) if st[WATCH] else 0
-        happen(st, eeprom, source, due)
+        happen(st, memory, source, due)
         if st[WATCH]:
             note_raised(st, before, due)
         st[HORIZON] = SOMETHING_CHANGED  # the CPU loop must look for interrupts at the next instruction
@@ -66,8 +66,8 @@ def process_events(st: State, eeprom: Bytes, until: int) -> int:
     return due
 
 
-@kernel
-def happen(st: State, eeprom: Bytes, source: int, cycle: int) -> None:
+@inlined
+def happen(st: State, memory: Bytes, source: int, cycle: int) -> None:
     """One event of one source."""
     if source <= DUE_TIMER2:
         t = TIMER1 if source == DUE + 1 else (TIMER0 if source == DUE else TIMER2)
@@ -84,7 +84,7 @@ def happen(st: State, eeprom: Bytes, source: int, cycle: int) -> None:
     elif source == DUE_CAPTURE:
         capture(st, cycle)
     elif source == DUE_EEPROM:
-        finish_write(st, eeprom)
+        finish_write(st, memory)
     elif source == DUE_WATCHDOG:
         watchdog_timeout(st, cycle)
     elif source == DUE_SPM:

@@ -21,25 +21,3 @@ def sign_flags(result: int, overflow: int) -> int:
     negative = result >> 7
     zero = 1 if result == 0 else 0
     return (zero << 1) | (negative << 2) | (overflow << 3) | ((negative ^ overflow) << 4)
-
-
-@kernel
-def add_flags(a: int, b: int, result: int) -> int:
-    """H, S, V, N, Z, C of a + b (+ C)."""
-    carry = (a & b) | ((a | b) & ~result)
-    overflow = (((a ^ result) & (b ^ result)) >> 7) & 1
-    return ((carry >> 7) & 1) | ((carry & 8) << 2) | sign_flags(result, overflow)
-
-
-@kernel
-def subtract_flags(a: int, b: int, result: int) -> int:
-    """H, S, V, N, Z, C of a - b (- C); the instructions with carry further AND Z with the old Z."""
-    borrow = (~a & b) | ((~a | b) & result)
-    overflow = (((a ^ b) & (a ^ result)) >> 7) & 1
-    return ((borrow >> 7) & 1) | ((borrow & 8) << 2) | sign_flags(result, overflow)
-
-
-@kernel
-def shift_flags(result: int, carry: int) -> int:
-    """S, V, N, Z, C of a shift to the right: V = N xor C."""
-    return carry | sign_flags(result, (result >> 7) ^ carry)

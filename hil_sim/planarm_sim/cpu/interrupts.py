@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from planarm_sim.cpu.compiled import kernel  # kernel_cache: see there
+from planarm_sim.cpu.compiled import inlined, kernel  # kernel_cache: see there
 from planarm_sim.cpu.layout import LEVEL, RAISED_AT, State
 from planarm_sim.cpu.registers import (
     ADCSRA,
@@ -92,7 +92,7 @@ def low_levels(st: State) -> int:
     return int((low & 1 if sense & 3 == 0 else 0) | (low & 2 if sense & 12 == 0 else 0))
 
 
-@kernel
+@inlined
 def lowest_bit(mask: int) -> int:
     """Number of the lowest set bit of a mask that is not 0."""
     number = 0
@@ -102,7 +102,7 @@ def lowest_bit(mask: int) -> int:
     return number
 
 
-@kernel
+@inlined
 def acknowledge(st: State, vector: int) -> bool:
     """Clear what the hardware clears when the vector is taken; False where the request stays, or may stay.
 

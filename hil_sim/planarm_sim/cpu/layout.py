@@ -34,7 +34,8 @@ UNKNOWN = -1
     CYCLE,  # clock cycles since power-up
     SP,  # stack pointer, 16 bits
     SREG_BITS,
-    HORIZON,  # the first cycle at which the CPU loop has to look at anything beside instructions
+    HORIZON,  # the first cycle at which something beside instructions is due
+    LOOK_AT,  # the first cycle at which the CPU loop looks up from instructions: HORIZON, or 0 at once
     IRQ_EARLIEST,  # no interrupt is taken before this cycle (one instruction after SEI and RETI)
     PENDING,  # interrupts with flag and enable set, at least; or UNKNOWN
     ASLEEP,  # 0 awake, else 1 + sleep mode (SM2:0)
@@ -44,7 +45,7 @@ UNKNOWN = -1
     ACCESS,  # what the instruction that just ended wants from I/O, and the particulars (see `access`)
     ACCESS_ADDRESS,
     ACCESS_VALUE,
-    ACCESS_PC,
+    ACCESS_PC,  # word address of the instruction
     WATCH,  # 1 while RAISED_AT is kept; see `planarm_sim.insight`
     ENTERED_AT,  # cycle at which the last interrupt's first instruction began, and its vector
     ENTERED_VECTOR,
@@ -108,7 +109,7 @@ UNKNOWN = -1
     IN_HEAD,
     IN_TAIL,
     _CPU_END,
-) = range(256, 256 + 72)
+) = range(256, 256 + 73)
 
 # --- When each source of events is due ----------------------------------------------------------------------
 (
@@ -204,7 +205,30 @@ STATE_WORDS = TOUCHED + 256
 """What a snapshot has to copy of the state array; the queues are behind it."""
 CONSTANTS = STATE_WORDS
 """256 words that hold 0 to 255: the second register of instructions with a constant."""
-QUEUES = CONSTANTS + 256
+RESULT_FLAGS = CONSTANTS + 256
+CARRY_FLAGS = RESULT_FLAGS + 256
+SHIFT_FLAGS = CARRY_FLAGS + 512
+"""SREG bits by result, by carries and by shifted value; see `tables`."""
+
+# --- The loop that is watched (see `idle`); nothing that decides the run, so no snapshot has it --------------
+(
+    CHANGES,  # counts what could make one turn of a loop differ from the next, beside what is compared
+    LAST_BACK,  # where the program last jumped back to
+    WATCHED,  # head of the loop that is watched, or -1
+    WATCH_SAW,  # 1 once the program came by there since the CPU loop last looked up
+    WATCH_REST,  # how many more times the CPU loop looks up before another loop is watched
+    WATCH_PENALTY,
+    WATCH_STAMP,  # CHANGES when the record was made
+    WATCH_TURNS,
+    WATCH_NEXT,  # turns after which the record is made anew
+    WATCH_CYCLE,  # cycle of the record
+    WATCH_SRAM,  # 1 when the SRAM is part of the record
+    PASSED_OVER,  # cycles, in all
+    WATCH_RECORD,  # 38 words
+) = range(SHIFT_FLAGS + 512, SHIFT_FLAGS + 512 + 13)
+KEPT_SRAM = WATCH_RECORD + 38
+"""256 words: the SRAM as it was."""
+QUEUES = KEPT_SRAM + 256
 
 TX_WIDTH, RX_WIDTH = 3, 4
 """Words per entry: sent frames (cycle, data, bit cycles), received ones (start, bit cycles * 2^16, bits, count)."""

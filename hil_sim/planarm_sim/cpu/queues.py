@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from planarm_sim.cpu import layout as at
 from planarm_sim.cpu.layout import State
+from planarm_sim.cpu.tables import CONSTANT_WORDS
 
 FIRST_ENTRIES = 4096
 LOG_MARGIN = 256
@@ -57,7 +58,7 @@ def allocate(state: State, entries: tuple[NDArray[np.int64], ...]) -> State:
     sizes = [_room(len(content) // queue.width) * queue.width for queue, content in zip(ALL, entries, strict=True)]
     st = np.zeros(at.QUEUES + sum(sizes), dtype=np.int64)
     st[: at.QUEUES] = state[: at.QUEUES]
-    st[at.CONSTANTS : at.QUEUES] = np.arange(256)
+    st[at.CONSTANTS : at.CONSTANTS + len(CONSTANT_WORDS)] = CONSTANT_WORDS
     base = at.QUEUES
     for queue, content, size in zip(ALL, entries, sizes, strict=True):
         st[queue.base] = base

@@ -39,6 +39,8 @@ NAMES: dict[int, str] = {
 
 IO_START, SRAM_START, SRAM_END = 0x20, 0x100, 0x900
 """The data space: 32 registers, I/O and extended I/O from IO_START, 2 KiB of SRAM, nothing from SRAM_END on."""
+EEPROM_START, EEPROM_BYTES = SRAM_END - SRAM_START, 1024
+"""Where the EEPROM stands in the array that holds both memories, behind the SRAM."""
 
 # Registers that read as they were last written, whatever the time; the general registers among them.
 READS_PLAIN = np.zeros(256, dtype=np.bool_)

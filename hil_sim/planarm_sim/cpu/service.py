@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
-from planarm_sim.cpu.compiled import kernel  # kernel_cache: see there
+from planarm_sim.cpu.access import LAST_READ, NOTHING, TURN, access_data, take_interrupt
+from planarm_sim.cpu.compiled import inlined, kernel  # kernel_cache: see there
 from planarm_sim.cpu.events import next_event, process_events
 from planarm_sim.cpu.flags import I
+from planarm_sim.cpu.idle import choose_loop, pass_over
 from planarm_sim.cpu.interrupts import lowest_bit, pending_interrupts
 from planarm_sim.cpu.layout import (
+    ACCESS,
     ASLEEP,
     CYCLE,
     EDGE_COUNT,
     EDGE_LIMIT,
     HORIZON,
     IRQ_EARLIEST,
+    LOOK_AT,
     NEVER,
     PENDING,
     RESET_REQUEST,
@@ -32,11 +36,38 @@ FIRST_STOP = REACHED
 
 
 @kernel
-def service(st: State, eeprom: Bytes, target: int) -> int:
+def look_up(st: State, memory: Bytes, words: State, target: int) -> int:
+    """All that happens between the instruction that has ended at CYCLE and the next one at PC.
+
+    `words` is `memory` as int64 words. Returns RUNNING with LOOK_AT set, or why the CPU loop ends.
+    """
+    access = st[ACCESS]
+    if access == TURN:
+        st[ACCESS] = NOTHING
+        pass_over(st, words)
+    elif access != NOTHING:
+        until = st[CYCLE] - 1 if access <= LAST_READ else st[CYCLE]
+        if until >= st[HORIZON]:  # no event is due before the horizon
+            process_events(st, memory, until)
+        access_data(st, memory)
+    if st[CYCLE] >= st[HORIZON]:
+        cause = service(st, memory, target)
+        while RUNNING < cause < FIRST_STOP:
+            take_interrupt(st, memory, cause)
+            cause = service(st, memory, target)
+        if cause != RUNNING:
+            return int(cause)
+        choose_loop(st)
+    st[LOOK_AT] = st[HORIZON]
+    return RUNNING
+
+
+@inlined
+def service(st: State, memory: Bytes, target: int) -> int:
     """Let happen what is due; RUNNING with HORIZON set when the CPU goes on, else a vector or a stop."""
     while True:
         cycle = int(st[CYCLE])
-        due = process_events(st, eeprom, cycle)
+        due = process_events(st, memory, cycle)
         if st[RESET_REQUEST]:
             return RESET_WANTED
         if cycle >= target:
@@ -63,7 +94,7 @@ def service(st: State, eeprom: Bytes, target: int) -> int:
 
 
 @kernel
-def stand_still(st: State, eeprom: Bytes, until: int) -> int:
+def stand_still(st: State, memory: Bytes, until: int) -> int:
     """Let time pass up to the cycle `until` while the CPU is halted; REACHED, or what must be seen to before."""
     while True:
         due = next_event(st)
@@ -71,7 +102,7 @@ def stand_still(st: State, eeprom: Bytes, until: int) -> int:
             st[CYCLE] = until
             return REACHED
         st[CYCLE] = max(st[CYCLE], due)
-        process_events(st, eeprom, due)
+        process_events(st, memory, due)
         if st[RESET_REQUEST]:
             return RESET_WANTED
         if st[EDGE_COUNT] >= st[EDGE_LIMIT] or st[TX_COUNT] >= st[TX_LIMIT]:

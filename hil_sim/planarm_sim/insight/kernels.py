@@ -95,8 +95,8 @@ def bin_of(value: int) -> int:
 @kernel
 def run_watched(
     st: State,
-    sram: Bytes,
-    eeprom: Bytes,
+    memory: Bytes,
+    words: State,
     code: State,
     landmarks: State,
     flash: Bytes,
@@ -110,14 +110,14 @@ def run_watched(
 ) -> int:
     """Run as `dispatch.run` does, on `landmarks`, and note what is met; `code` has the instructions themselves."""
     while True:
-        cause = run(st, sram, eeprom, landmarks, flash, target)
+        cause = run(st, memory, words, landmarks, flash, target)
         role = int(roles[st[PC]]) if cause == AT_BAD_OPCODE else 0
         if role == 0:
             return cause
         if role & BREAKPOINT:
             return TRAPPED
         arrive(st, role, totals, frames, functions, vectors, log)
-        cause = run(st, sram, eeprom, code, flash, int(st[CYCLE]) + 1)
+        cause = run(st, memory, words, code, flash, int(st[CYCLE]) + 1)
         leave(st, role, totals, frames, functions, vectors, log)
         if cause != REACHED:
             return cause

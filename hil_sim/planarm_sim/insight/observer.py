@@ -86,13 +86,13 @@ class Observer:
         self._breakpoints = frozenset(words)
         self._program = None
 
-    def advance(self, st: State, sram: Bytes, eeprom: Bytes, program: Program, target: int) -> int:
+    def advance(self, st: State, memory: Bytes, words: State, program: Program, target: int) -> int:
         """Run as `dispatch.run` does and note what is met; returns one of `service`'s stops."""
         if program is not self._program:
             self._look_at(program)
         while True:
             cause = k.run_watched(
-                st, sram, eeprom, program.code, self._landmarks, program.flash, self._roles, *self._arrays(), target
+                st, memory, words, program.code, self._landmarks, program.flash, self._roles, *self._arrays(), target
             )
             self._take_log()
             if cause != k.LOG_FULL:

@@ -22,7 +22,7 @@ from planarm_sim.cpu.layout import (
     NEVER,
     State,
 )
-from planarm_sim.cpu.registers import ADCH, ADCL, ADCSRA, ADCSRB, ADMUX
+from planarm_sim.cpu.registers import ADCL, ADCSRA, ADCSRB, ADMUX
 
 ADEN, ADSC, ADATE, ADIF, ADIE, ADPS = 1 << 7, 1 << 6, 1 << 5, 1 << 4, 1 << 3, 7  # ADCSRA
 ADLAR = 1 << 5  # ADMUX
@@ -47,12 +47,10 @@ def adc_clock(st: State) -> int:
 
 @kernel
 def read_adc(st: State, address: int) -> int:
-    """Read a register; ADCL holds the result until ADCH is read (24.2)."""
-    if address in (ADCL, ADCH):
-        result = st[ADC_RESULT] << 6 if st[ADMUX] & ADLAR else st[ADC_RESULT]
-        st[ADC_LOCKED] = address == ADCL
-        return int(result & 0xFF if address == ADCL else result >> 8)
-    return int(st[address])
+    """Read ADCL, which holds the result until ADCH is read, or ADCH (24.2)."""
+    result = st[ADC_RESULT] << 6 if st[ADMUX] & ADLAR else st[ADC_RESULT]
+    st[ADC_LOCKED] = address == ADCL
+    return int(result & 0xFF if address == ADCL else result >> 8)
 
 
 @kernel

@@ -20,7 +20,7 @@ from planarm_sim.cpu.layout import (
     Bytes,
     State,
 )
-from planarm_sim.cpu.registers import EEARH, EEARL, EECR, EEDR
+from planarm_sim.cpu.registers import EEARH, EEARL, EECR, EEDR, EEPROM_BYTES, EEPROM_START
 from planarm_sim.peripherals.self_programming import erase_buffer
 
 EEPM, EERIE, EEMPE, EEPE, EERE = 3 << 4, 1 << 3, 1 << 2, 1 << 1, 1 << 0
@@ -28,7 +28,6 @@ ERASE_AND_WRITE, ERASE, WRITE = 0, 1, 2
 WRITE_CYCLES, HALF_WRITE_CYCLES = 54_400, 28_800  # 3.4 ms and 1.8 ms at 16 MHz
 READ_HALT, WRITE_HALT = 4, 2
 WINDOW_CYCLES = 4
-EEPROM_BYTES = 1024
 
 
 @kernel
@@ -38,7 +37,7 @@ def read_control(st: State, cycle: int) -> int:
 
 
 @kernel
-def write_control(st: State, eeprom: Bytes, value: int, cycle: int) -> None:
+def write_control(st: State, memory: Bytes, value: int, cycle: int) -> None:
     """Write EECR: read a byte, start a write, open the window."""
     busy = st[EECR] & EEPE
     address = (st[EEARL] | (st[EEARH] << 8)) % EEPROM_BYTES
@@ -57,20 +56,20 @@ def write_control(st: State, eeprom: Bytes, value: int, cycle: int) -> None:
     elif value & EEMPE:
         st[EE_WRITE_UNTIL] = cycle + WINDOW_CYCLES
     if not busy and value & EERE and st[EECR] & EEPE == 0:
-        st[EEDR] = eeprom[address]
+        st[EEDR] = memory[EEPROM_START + address]
         st[CYCLE] += READ_HALT
 
 
 @kernel
-def finish_write(st: State, eeprom: Bytes) -> None:
+def finish_write(st: State, memory: Bytes) -> None:
     """The programming time is over: the byte is there, and EEPE reads zero."""
     address = st[EE_BUSY_ADDRESS]
     mode = st[EE_BUSY_MODE]
     if mode == ERASE:
-        eeprom[address] = 0xFF
+        memory[EEPROM_START + address] = 0xFF
     elif mode == WRITE:
-        eeprom[address] &= st[EE_BUSY_DATA]
+        memory[EEPROM_START + address] &= st[EE_BUSY_DATA]
     else:
-        eeprom[address] = st[EE_BUSY_DATA]
+        memory[EEPROM_START + address] = st[EE_BUSY_DATA]
     st[EECR] &= ~EEPE
     st[DUE_EEPROM] = NEVER

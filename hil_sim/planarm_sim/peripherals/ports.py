@@ -10,6 +10,7 @@ from __future__ import annotations
 from planarm_sim.cpu.compiled import constant, kernel  # kernel_cache: see there
 from planarm_sim.cpu.layout import (
     CHANGED_AT,
+    CHANGES,
     CLOCK_FALLING,
     CLOCK_RISING,
     DIRECTION,
@@ -155,6 +156,7 @@ def schedule_capture(st: State, level: int, cycle: int) -> None:
 def read_pins(st: State, port: int, cycle: int) -> int:
     """PINx as the CPU reads it in the clock cycle that begins at `cycle`: the levels one cycle before."""
     if st[CHANGED_AT + port] >= cycle:
+        st[CHANGES] += 1
         return int(st[LEVEL_BEFORE + port])
     return int(st[LEVEL + port])
 
