@@ -17,13 +17,20 @@
 Every message names the cause, the place, the value, the limit and the setting to change.
 """
 
-from typing import ClassVar
+from collections.abc import Mapping
+from types import MappingProxyType
+from typing import Any, ClassVar
 
 
 class PlanarmError(Exception):
-    """Base of all errors that planarm raises on purpose; `exit_code` is what the command line returns."""
+    """Base of all errors that planarm raises on purpose; `exit_code` is what the command line returns.
+
+    `advice` are sentences on what would help, `fields` what `--json` prints besides; both may be empty.
+    """
 
     exit_code: ClassVar[int] = 1
+    advice: tuple[str, ...] = ()
+    fields: Mapping[str, Any] = MappingProxyType({})
 
 
 class SceneError(PlanarmError):

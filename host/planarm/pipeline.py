@@ -21,8 +21,10 @@ from planarm.plan import Findings, Plan
 from planarm.plan_file import StoredPlan
 from planarm.run_folder import begin_run_folder, finish_run_folder
 from planarm.scene import Scene
+from planarm.search.diagnosis import diagnose
 from planarm.search.grid_search import find_path
 from planarm.search.path import Path as TipPath
+from planarm.search.result import SearchStatus
 from planarm.smoothing.smooth import smooth_path
 from planarm.smoothing.smooth_path import SmoothPath
 from planarm.stepping.certify import Certificate, certify
@@ -92,21 +94,17 @@ def shortest_path(scene: Scene) -> tuple[FreeMap, TipPath, float]:
     """
     margin_cm = scene.margin_cm + quantisation_bound_cm(Arm.from_spec(scene.arm), scene.joints, scene.coupling)
     found: list[tuple[FreeMap, TipPath, float]] = []
-    problems: list[SceneError | NoPathError] = []
     for side in elbow_sides(scene.arm):
-        free_map = build_free_map(scene, margin_cm, side)
         try:
+            free_map = build_free_map(scene, margin_cm, side)
             check_task(scene, free_map)
-        except SceneError as error:
-            problems.append(error)
+        except SceneError:  # on this side; told below when it is so on all sides
             continue
         result = find_path(free_map, scene.task.start_cm, scene.task.goal_cm, scene.planner)
-        if result.path is None:
-            problems.append(NoPathError(f"{scene.source}: {result.reason}"))
-        else:
+        if result.path is not None:
             found.append((free_map, result.path, result.plan_s))
     if not found:
-        raise problems[0]
+        raise no_path(scene, margin_cm)
     return min(found, key=lambda one: one[1].length_cm)
 
 
@@ -121,6 +119,19 @@ def smoothed(scene: Scene, free_map: FreeMap, path: TipPath) -> SmoothPath:
     return smooth_path(
         path, free_map, Arm.from_spec(scene.arm), world, motion.tolerance_cm, stop=motion.corners == "stop"
     )
+
+
+def no_path(scene: Scene, margin_cm: float) -> SceneError | NoPathError:
+    """Return the error that tells why a scene has no path and what would help."""
+    found = diagnose(scene, margin_cm)
+    ends = {SearchStatus.START_BLOCKED: "task.start_cm", SearchStatus.GOAL_BLOCKED: "task.goal_cm"}
+    error: SceneError | NoPathError
+    if found.status in ends and found.cause != "join":
+        error = SceneError(scene.source, ends[found.status], found.reason)
+    else:
+        error = NoPathError(f"{scene.source}: {found.reason}")
+    error.advice, error.fields = found.advice, found.fields()
+    return error
 
 
 def stored(plan: Plan) -> StoredPlan:

@@ -102,9 +102,11 @@ def report_error(error: PlanarmError, as_json: bool) -> None:
     """Print the error where its reader looks: one JSON object on stdout, or a sentence on stderr."""
     if as_json:
         told = {"kind": type(error).__name__, "message": str(error), "exit_code": error.exit_code}
-        print(json.dumps({"error": told}))
+        print(json.dumps({"error": {**error.fields, **told}}))
     else:
         print(f"planarm: {error}", file=sys.stderr)
+        if error.advice:
+            print("What would help:", *(f"  - {sentence}" for sentence in error.advice), sep="\n", file=sys.stderr)
 
 
 Commands: TypeAlias = "argparse._SubParsersAction[_Parser]"

@@ -13,6 +13,7 @@ class SearchStatus(Enum):
     NO_PATH = "no path"
     START_BLOCKED = "start blocked"
     GOAL_BLOCKED = "goal blocked"
+    ELBOW = "elbow cannot change"
 
 
 @dataclass(frozen=True, slots=True)
