@@ -17,6 +17,7 @@ from planarm.errors import CertificateError, NoPathError, SceneError, StepsDiffe
 from planarm.link.exchange import StreamResult, stream_plan
 from planarm.link.transport import PinTrace, Transport, open_transport
 from planarm.model.arm import Arm
+from planarm.model.transmission import motor_axes
 from planarm.plan import Findings, Plan
 from planarm.plan_file import StoredPlan
 from planarm.run_folder import begin_run_folder, finish_run_folder
@@ -29,7 +30,7 @@ from planarm.smoothing.smooth import smooth_path
 from planarm.smoothing.smooth_path import SmoothPath
 from planarm.stepping.certify import Certificate, certify
 from planarm.stepping.quantise import quantisation_bound_cm, quantise
-from planarm.stepping.segments import SegmentPlan, compress, expand
+from planarm.stepping.segments import Coding, SegmentPlan, compress, expand
 from planarm.summary import summarise
 from planarm.trajectory.timing import time_path
 from planarm.workspace.check_task import check_task
@@ -66,7 +67,7 @@ def plan_scene(scene: Scene, notice: Notice) -> Plan:
         )
     notice("plan", 0.6)
     train = quantise(trajectory, scene.joints, scene.coupling)
-    segments = compress(train)
+    segments = compress(train, Coding.of(motor_axes(scene.joints, scene.coupling)))
     notice("plan", 0.8)
     certificate = certify(scene, trajectory, train, segments)
     notice("plan", 1.0)

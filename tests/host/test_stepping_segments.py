@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from motion_paths import joint, tip_path, tip_points
 from planarm.errors import TimingError
 from planarm.stepping.quantise import quantise
-from planarm.stepping.segments import compress, expand
+from planarm.stepping.segments import Coding, compress, expand
 from planarm.stepping.train import MIN_REVERSAL_TICKS, JointSteps, StepTrain
 from planarm.trajectory.timing import time_path
 from planarm_wire.codec import decode, encode
@@ -22,6 +22,7 @@ from planarm_wire.messages import (
 )
 from planarm_wire.steps import expand_moves
 
+WITHOUT_FAST_MOTORS = Coding()
 NO_STEPS = JointSteps(np.zeros(0, np.int64), np.zeros(0, np.int8))
 
 
@@ -36,17 +37,18 @@ def train_of(*steps, after=1):
     return StepTrain(tuple(range(len(steps))), steps, last + after)
 
 
-def tolerance(ticks):
-    """16 ticks, or 2 % of the shorter of the intervals around each step."""
+def tolerance(ticks, coding=WITHOUT_FAST_MOTORS):
+    """1 us, at most 4 % of the shorter of the intervals around each step; or 2 % of it."""
     gaps = np.diff(ticks)
     if not len(gaps):
-        return np.full(len(ticks), 16)
-    return np.maximum(16, np.floor(0.02 * np.minimum(np.r_[gaps[:1], gaps], np.r_[gaps, gaps[-1:]])))
+        return np.full(len(ticks), coding.ticks)
+    shorter = np.minimum(np.r_[gaps[:1], gaps], np.r_[gaps, gaps[-1:]])
+    return np.floor(np.maximum(coding.share * shorter, np.minimum(coding.ticks, coding.most_share * shorter)))
 
 
-def check_everything(train):
+def check_everything(train, coding=WITHOUT_FAST_MOTORS):
     """Compress, expand in two ways, and check counts, directions, times and the wire's rules."""
-    plan = compress(train)
+    plan = compress(train, coding)
     begin = 0
     ticks, directions = [[], []], [[], []]
     rest = [None, None]
@@ -78,20 +80,32 @@ def check_everything(train):
     assert begin == plan.duration_ticks == train.duration_ticks
     made = expand(plan)
     assert made.start_usteps == train.start_usteps
+    check_fast_segments_are_short(plan, made, coding)
     for j, wanted in enumerate(train.steps):
         assert made.steps[j].ticks.tolist() == ticks[j]
         assert directions[j] == made.steps[j].directions.tolist() == wanted.directions.tolist()
-        assert (np.abs(made.steps[j].ticks - wanted.ticks) <= tolerance(wanted.ticks)).all()
+        assert (np.abs(made.steps[j].ticks - wanted.ticks) <= tolerance(wanted.ticks, coding)).all()
         along = np.diff(wanted.directions) == 0
         if along.any():
             assert np.diff(made.steps[j].ticks)[along].min() >= np.diff(wanted.ticks)[along].min()
     return plan
 
 
+def check_fast_segments_are_short(plan, made, coding):
+    """Every segment longer than the limit overlaps no interval of a motor above its start-stop speed."""
+    ends = np.cumsum([segment.duration_flags >> 1 for segment in plan.segments])
+    begins = np.concatenate([[0], ends[:-1]])
+    for steps, start_stop in zip(made.steps, coding.start_stop_ticks, strict=False):
+        fast = np.diff(steps.ticks) < 0.96 * start_stop  # the tolerance may have made a slow one fast
+        for begin, end in zip(steps.ticks[:-1][fast], steps.ticks[1:][fast], strict=True):
+            over = (begins < end) & (ends > begin)
+            assert (ends - begins)[over].max() <= coding.fast_ticks
+
+
 @settings(max_examples=15, deadline=None)
-@given(seed=st.integers(0, 10**6))
-def test_trains_of_motions(seed):
-    check_everything(train_of_motion(seed))
+@given(seed=st.integers(0, 10**6), capped=st.booleans())
+def test_trains_of_motions(seed, capped):
+    check_everything(train_of_motion(seed), Coding.of([joint(), joint()]) if capped else WITHOUT_FAST_MOTORS)
 
 
 def test_motions_take_few_segments():
@@ -126,9 +140,31 @@ def nasty_steps(draw):
 
 
 @settings(max_examples=300, deadline=None)
-@given(first=nasty_steps(), second=nasty_steps(), after=st.sampled_from([1, 2, 1000, 10**6]))
-def test_nasty_trains(first, second, after):
-    check_everything(train_of(first, second, after=after))
+@given(
+    first=nasty_steps(),
+    second=nasty_steps(),
+    after=st.sampled_from([1, 2, 1000, 10**6]),
+    start_stop=st.sampled_from([0, 0, 2_000, 100_000, 10**7]),
+)
+def test_nasty_trains(first, second, after, start_stop):
+    check_everything(train_of(first, second, after=after), Coding(start_stop_ticks=(start_stop, start_stop)))
+
+
+@pytest.mark.parametrize("coding", [Coding(share=0.0, most_share=1.0), Coding(ticks=400, share=0.0, most_share=1.0)])
+def test_other_tolerances_are_kept(coding):
+    check_everything(train_of_motion(5), coding)
+
+
+def test_three_and_four_joints_share_segments():
+    rng = np.random.default_rng(4)
+    for joints in (1, 3, 4):
+        steps = [random_nasty_steps(rng) for _ in range(joints)]
+        train = train_of(*steps)
+        made = expand(compress(train))
+        assert made.duration_ticks == train.duration_ticks
+        for wanted, one in zip(steps, made.steps, strict=True):
+            assert one.directions.tolist() == wanted.directions.tolist()
+            assert (np.abs(one.ticks - wanted.ticks) <= tolerance(wanted.ticks)).all()
 
 
 @settings(max_examples=60, deadline=None)
@@ -140,12 +176,12 @@ def test_joints_that_step_at_nearly_the_same_ticks(steps, shift, other):
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_counts_are_exact_over_many_steps(seed):
+def test_counts_are_exact_over_many_steps(seed, sized):
     # Speeds that wander between 200 and 20,000 steps/s, with reversals.
     rng = np.random.default_rng(seed)
     joints = []
     for _ in range(2):
-        count = 60_000
+        count = sized(60_000, 600_000)
         wander = np.cumsum(rng.normal(0.0, 0.003, count))
         gaps = np.clip(800.0 * np.exp(np.abs(wander) * 3.0), 800, 80_000).astype(np.int64)
         directions = np.where(np.cumsum(rng.random(count) < 2e-4) % 2 == 0, 1, -1)
@@ -153,7 +189,7 @@ def test_counts_are_exact_over_many_steps(seed):
         gaps[0] += 320
         joints.append(steps_of(gaps, directions))
     plan = check_everything(train_of(*joints))
-    assert len(plan.segments) < 0.2 * 120_000
+    assert len(plan.segments) < 0.2 * sum(len(steps.ticks) for steps in joints)
 
 
 @pytest.mark.parametrize("seed", [382, 1226])

@@ -35,8 +35,8 @@ line's interrupts; the main program's work on a segment, from the rates at which
 and how long before its start a segment must be there. The last keeps an overloaded board's time finite."""
 
 TIMING_SHARE = 0.02
-TIMING_TICKS = 6
-"""Permitted error of a step's time: the greater of the two, the first of the shorter interval around it."""
+TIMING_TICKS = 16
+"""Permitted error of a step's time: 1 us, or this share of the shorter interval around it if that is more."""
 
 
 def check_counts(train: StepTrain, made: StepTrain, number: int) -> list[Check]:

@@ -3,7 +3,8 @@
 Each step has a window of allowed ticks. In real numbers T is a quadratic in n; `best_polynomial` finds the one
 whose largest error, in window widths, is least. Its I and A are rounded to integers, and only the exact expansion of
 these decides: it leaves a range for `first`, or none. Where the quadratic is inside all windows but an interval is too
-short, as when a joint goes on at its top speed, the first interval is held at its limit and the rest fitted.
+short or too long, as where a joint comes to or goes on at its top speed, that interval is held at its limit and the
+rest fitted.
 """
 
 from math import floor
@@ -42,12 +43,12 @@ def fit_run(low: Ticks, high: Ticks, least_interval: int) -> Fit:
         # Any interval between the steps' windows; with one step, none.
         apart = max(least_interval, (low[-1] + high[-1] - low[0] - high[0]) // 2) if steps == 2 else 0
         return placed(low, high, least_interval, apart * ONE_Q16, 0)
-    inside, interval, add, held = False, 0, 0, 0
-    for _ in range(2):
-        inside, interval, add = fitted(low, high, held)
-        if not inside or min(interval, interval + (steps - 2) * add) >= least_interval * ONE_Q16:
-            break
-        held = least_interval
+    inside, interval, add = fitted(low, high)
+    last = interval + (steps - 2) * add
+    if inside and min(interval, last) < least_interval * ONE_Q16:
+        inside, interval, add = fitted_held(low, high, least_interval, last < interval, 1)
+    elif inside and max(interval, last) > MAX_INTERVAL_TICKS * ONE_Q16:
+        inside, interval, add = fitted_held(low, high, MAX_INTERVAL_TICKS, last > interval, -1)
     return placed(low, high, least_interval, interval, add) if inside else (False, 0, 0, 0)
 
 
@@ -67,34 +68,96 @@ def placed(low: Ticks, high: Ticks, least_interval: int, interval: int, add: int
         since_first = (n * interval + n * (n - 1) // 2 * add) >> 16
         earliest = max(earliest, low[n] - since_first)
         latest = min(latest, high[n] - since_first)
-    return earliest <= latest, earliest + (latest - earliest) // 2, interval, add
+    return earliest <= latest, fewest_bytes(earliest, latest), interval, add
 
 
 @kernel
-def fitted(low: Ticks, high: Ticks, held: int) -> tuple[bool, int, int]:
-    """Return (inside, interval_q16, add_q16) of the best quadratic through three or more windows.
+def fewest_bytes(low: int, high: int) -> int:
+    """Return the number between low and high that takes the fewest bytes on the wire: the middle, or near a border."""
+    middle = low + (high - low) // 2
+    border = 128
+    while border <= low:
+        border <<= 7
+    return min(middle, border - 1)
 
-    With `held` > 0 the first interval is that, and only the add is fitted, 0 or more: what the held interval leaves of
-    the times is a straight line over n (n - 1) / 2. Steps 0 and 1 share its zero and become one point, in both windows.
+
+@kernel
+def fit_smaller(low: Ticks, high: Ticks, least_interval: int, add: int) -> Fit:
+    """Return a run whose add takes fewer bytes than `add`, if one is found: the nearest of each length, shortest first.
+
+    Args:
+        low: as for `fit_run`.
+        high: as for `fit_run`.
+        least_interval: as for `fit_run`.
+        add: of a run that fits.
     """
+    limit = 64  # zigzag: one byte holds -64 .. 63
+    while low.shape[0] > 2 and not -limit <= add < limit:
+        smaller = limit - 1 if add > 0 else -limit
+        inside, interval = fitted_line(low, high, smaller)
+        if inside:
+            found, first, interval, smaller = placed(low, high, least_interval, interval, smaller)
+            if found:
+                return found, first, interval, smaller
+        limit <<= 7
+    return False, 0, 0, 0
+
+
+@kernel
+def fitted_line(low: Ticks, high: Ticks, add_q16: int) -> tuple[bool, int]:
+    """Return (inside, interval_q16): the best interval for a given add."""
+    steps = low.shape[0]
+    at, center, half = np.empty(steps), np.empty(steps), np.empty(steps)
+    for n in range(steps):
+        at[n] = n
+        center[n] = 0.5 * (low[n] + high[n] + 1) - 0.5 * n * (n - 1.0) * add_q16 / ONE_Q16
+        half[n] = 0.5 * (high[n] + 1 - low[n])
+    inside, _, newton = best_polynomial(at, center, half, 1)
+    return inside, floor(newton[1] * ONE_Q16 + 0.5)
+
+
+@kernel
+def fitted(low: Ticks, high: Ticks) -> tuple[bool, int, int]:
+    """Return (inside, interval_q16, add_q16) of the best quadratic through three or more windows."""
     steps = low.shape[0]
     at, center, half = np.empty(steps), np.empty(steps), np.empty(steps)
     for n in range(steps):
         # The real time of a step, between low and high + 1, is rounded down.
-        center[n], half[n] = 0.5 * (low[n] + high[n] + 1) - held * n, 0.5 * (high[n] + 1 - low[n])
-        at[n] = 0.5 * n * (n - 1.0) if held > 0 else n
-    skipped = 0
-    if held > 0:
-        skipped = 1
-        bottom = max(center[0] - half[0], center[1] - half[1])
-        top = min(center[0] + half[0], center[1] + half[1])
-        center[1], half[1] = 0.5 * (bottom + top), max(0.5, 0.5 * (top - bottom))
-    inside, nodes, newton = best_polynomial(at[skipped:], center[skipped:], half[skipped:], 2 - skipped)
-    if held > 0:
-        return inside, held * ONE_Q16, max(0, floor(newton[1] * ONE_Q16 + 0.5))
+        at[n], center[n], half[n] = n, 0.5 * (low[n] + high[n] + 1), 0.5 * (high[n] + 1 - low[n])
+    inside, nodes, newton = best_polynomial(at, center, half, 2)
     # c0 + c1 (n - n0) + c2 (n - n0) (n - n1), written with n and n (n - 1) / 2
     interval, add = newton[1] + newton[2] * (1.0 - nodes[0] - nodes[1]), 2.0 * newton[2]
     add_q16 = floor(add * ONE_Q16 + 0.5)
     # What rounding A bends is taken back by I, so that both ends of the run stay.
     bent = add - add_q16 / ONE_Q16
     return inside, floor((interval + 0.5 * bent * (steps - 2)) * ONE_Q16 + 0.5), add_q16
+
+
+@kernel
+def fitted_held(low: Ticks, high: Ticks, held: int, at_end: bool, sense: int) -> tuple[bool, int, int]:
+    """Return (inside, interval_q16, add_q16) of the best quadratic whose first, or last, interval is `held`.
+
+    Away from there the intervals grow (sense 1) or shrink (-1), or stay.
+
+    By convexity, where the best quadratic breaks a limit of the intervals, the best that keeps it stands on the limit.
+    Counted from the held end, what the held interval leaves of the times is a straight line over n (n - 1) / 2. The two
+    steps at the held end share its zero and become one point, in both windows.
+    """
+    steps = low.shape[0]
+    at, center, half = np.empty(steps - 1), np.empty(steps - 1), np.empty(steps - 1)
+    bottom, top = 0.0, 0.0
+    for n in range(steps):
+        i = steps - 1 - n if at_end else n
+        sign = -1.0 if at_end else 1.0
+        middle, width = sign * 0.5 * (low[i] + high[i] + 1) - held * n, 0.5 * (high[i] + 1 - low[i])
+        if n < 2:
+            bottom = max(bottom, middle - width) if n else middle - width
+            top = min(top, middle + width) if n else middle + width
+        else:
+            at[n - 1], center[n - 1], half[n - 1] = 0.5 * n * (n - 1.0), middle, width
+    at[0], center[0], half[0] = 0.0, 0.5 * (bottom + top), max(0.5, 0.5 * (top - bottom))
+    inside, _, newton = best_polynomial(at, center, half, 1)
+    grows = sense * max(0, sense * floor(newton[1] * ONE_Q16 + 0.5))
+    if at_end:
+        return inside, held * ONE_Q16 + (steps - 2) * grows, -grows
+    return inside, held * ONE_Q16, grows

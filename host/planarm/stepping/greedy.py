@@ -8,8 +8,8 @@ joint's next step can still be made, at the latest in its window. So one step of
 import numpy as np
 from numpy.typing import NDArray
 
-from planarm.stepping.fit import fit_run
-from planarm.stepping.windows import GAP, HIGH, LOW, RUN_END, SETUP, TICK, Windows
+from planarm.stepping.fit import fit_run, fit_smaller
+from planarm.stepping.windows import FAST, GAP, HIGH, LOW, RUN_END, SETUP, TICK, Windows
 from planarm_wire.kernel_cache import kernel
 from planarm_wire.messages import MAX_SEGMENT_TICKS
 
@@ -20,32 +20,48 @@ COUNT, FIRST, INTERVAL, ADD = 0, 1, 2, 3
 
 NEVER = -(1 << 62)
 
+NO_BORDER = -2
 
-def cut(windows: Windows, duration_ticks: int) -> tuple[list[int], list[Ticks]]:
-    """Return (ends, runs): the tick at which each segment ends, and its runs, shape (joints, 4).
+SHARE_OF_FRAME = 4
+"""Bytes of a segment's frame beside it: header 3, two checks of 2, delimiter; as a rule two segments share a frame."""
+
+SHORTER_SIZES = 2
+"""How many segments a step or more shorter than the longest are looked at."""
+
+FIRST_TICKS = 64
+"""A segment starts this long before the window of the step after it, where there is room."""
+
+
+@kernel
+def cut(windows: Windows, fast_ticks: int, duration_ticks: int) -> tuple[Ticks, Ticks]:
+    """Return (ends, runs): the tick at which each segment ends, and its runs, shape (segments, joints, 4).
 
     By the invariant the last end is `duration_ticks`; the caller expands and checks it.
 
     Args:
         windows: the steps.
+        fast_ticks: the longest segment where a motor is fast.
         duration_ticks: the motion's end, where the last segment ends.
     """
-    joints = len(windows.least_interval)
+    joints = windows.least_interval.shape[0]
     following, last = windows.first[:-1].copy(), np.full(joints, NEVER)
-    ends, runs = [], []
-    begin, length = 0, 1
+    ends, runs = np.zeros(64, np.int64), np.zeros((64, joints, 4), np.int64)
+    segments, begin, length = 0, 0, 1
     while 0 <= begin < duration_ticks:
-        best = np.zeros((joints, 4), np.int64)
-        end, length = longest(windows, following, last, begin, duration_ticks, length, best)
-        for j, (count, first, interval, add) in enumerate(best.tolist()):
-            if count > 0:
-                n = count - 1
-                last[j] = begin + first + ((n * interval + n * (n - 1) // 2 * add) >> 16)
-        following += best[:, COUNT]
-        ends.append(end)
-        runs.append(best)
-        begin = end
-    return ends, runs
+        if segments == ends.shape[0]:
+            ends, runs = np.concatenate((ends, ends)), np.concatenate((runs, runs))
+        best = runs[segments]
+        best[:] = 0
+        end, length = longest(windows, following, last, begin, fast_ticks, duration_ticks, length, best)
+        end = cheapest(windows, following, last, begin, fast_ticks, duration_ticks, end, best)
+        for j in range(joints):
+            if best[j, COUNT] > 0:
+                n = best[j, COUNT] - 1
+                last[j] = begin + best[j, FIRST] + ((n * best[j, INTERVAL] + n * (n - 1) // 2 * best[j, ADD]) >> 16)
+            following[j] += best[j, COUNT]
+        ends[segments] = begin = end
+        segments += 1
+    return ends[:segments], runs[:segments]
 
 
 @kernel
@@ -54,6 +70,7 @@ def longest(
     following: Ticks,
     last: Ticks,
     begin: int,
+    fast_ticks: int,
     duration_ticks: int,
     guess: int,
     best: Ticks,
@@ -69,19 +86,105 @@ def longest(
     best_end, choice = -1, 0
     while size > fits or (fits == 0 and choice < joints + 2):
         if size > fits:
-            count_steps(windows, following, size, trial)
+            end, size = try_size(windows, following, last, begin, fast_ticks, duration_ticks, size, fails, trial)
         else:
             count_choice(windows, following, choice, trial)
             choice += 1
-        end = try_segment(windows, following, last, begin, duration_ticks, trial)
+            end = try_segment(windows, following, last, begin, fast_ticks, duration_ticks, trial)
         if end > begin:
-            fits, best_end = max(1, size), end
+            size = max(1, size)
+            fits, best_end = size, end
             copy_runs(trial, best)
             size = min(2 * size, (fits + fails) // 2)
         elif size > fits:
             fails = size
             size = (fits + fails) // 2
     return best_end, max(1, fits)
+
+
+@kernel
+def cheapest(
+    windows: Windows,
+    following: Ticks,
+    last: Ticks,
+    begin: int,
+    fast_ticks: int,
+    duration_ticks: int,
+    end: int,
+    best: Ticks,
+) -> int:
+    """Give `best`, the longest segment, its shortest form; take a little shorter one if it costs less a tick.
+
+    A segment is charged for the bytes of the next one's first ticks, too: a border shortly before a step saves some.
+    Returns the end.
+    """
+    size = 0
+    for j in range(best.shape[0]):
+        size += best[j, COUNT]
+    cost = charge(windows, following, last, begin, end, best)
+    trial = np.zeros_like(best)
+    for shorter in range(size - 1, max(size - 1 - SHORTER_SIZES, 0), -1):
+        count_steps(windows, following, shorter, trial)
+        trial_end = try_segment(windows, following, last, begin, fast_ticks, duration_ticks, trial)
+        if trial_end > begin and end < duration_ticks:
+            trial_cost = charge(windows, following, last, begin, trial_end, trial)
+            if trial_cost * (end - begin) < cost * (trial_end - begin):
+                cost, end = trial_cost, trial_end
+                copy_runs(trial, best)
+    return end
+
+
+@kernel
+def charge(windows: Windows, following: Ticks, last: Ticks, begin: int, end: int, runs: Ticks) -> int:
+    """Give the runs their shortest form; return the bytes of the segment and what its end costs the next one."""
+    total = SHARE_OF_FRAME + varuint_bytes(2 * (end - begin))
+    for j in range(runs.shape[0]):
+        count, n = runs[j, COUNT], following[j]
+        total += varuint_bytes(2 * count)
+        if count > 0:
+            shorten(windows, n, last[j], begin, end, runs[j], windows.least_interval[j])
+        if count > 1:
+            add = runs[j, ADD]
+            total += varuint_bytes(runs[j, INTERVAL]) + varuint_bytes(2 * add if add >= 0 else -2 * add - 1)
+        n += count
+        if n < windows.first[j + 1]:
+            total += varuint_bytes(max(windows.steps[n, SETUP], windows.steps[n, LOW] - end))
+    return total
+
+
+@kernel
+def varuint_bytes(number: int) -> int:
+    """Return the bytes that a number takes on the wire."""
+    size = 1
+    while number >= 128:
+        size += 1
+        number >>= 7
+    return size
+
+
+@kernel
+def try_size(
+    windows: Windows,
+    following: Ticks,
+    last: Ticks,
+    begin: int,
+    fast_ticks: int,
+    duration_ticks: int,
+    size: int,
+    fails: int,
+    trial: Ticks,
+) -> tuple[int, int]:
+    """Try a segment of the next `size` steps: return (end, size), or (-1, the size asked for).
+
+    That no border is possible says nothing of longer segments: the windows of two joints' steps may overlap. So up to
+    as many steps more as there are joints are tried, fewer than `fails`.
+    """
+    for longer in range(size, min(size + trial.shape[0] + 1, fails)):
+        count_steps(windows, following, longer, trial)
+        end = try_segment(windows, following, last, begin, fast_ticks, duration_ticks, trial)
+        if end != NO_BORDER:
+            return (end, longer) if end > begin else (-1, size)
+    return -1, size
 
 
 @kernel
@@ -108,31 +211,52 @@ def count_choice(windows: Windows, following: Ticks, choice: int, trial: Ticks) 
 
 
 @kernel
-def try_segment(windows: Windows, following: Ticks, last: Ticks, begin: int, duration_ticks: int, trial: Ticks) -> int:
-    """Fit trial[j, COUNT] steps of each joint j: fill the rest of `trial` and return the segment's end, or -1."""
+def try_segment(
+    windows: Windows, following: Ticks, last: Ticks, begin: int, fast_ticks: int, duration_ticks: int, trial: Ticks
+) -> int:
+    """Fit trial[j, COUNT] steps of each joint j: fill the rest of `trial` and return the segment's end.
+
+    NO_BORDER when it cannot end between its last steps and those that follow, -1 when the steps do not fit.
+    """
     for j in range(trial.shape[0]):
         n = following[j]
         if trial[j, COUNT] > 0 and n + trial[j, COUNT] > windows.steps[n, RUN_END]:
             return -1
-    end = border(windows, following, last, begin, duration_ticks, trial)
+    end = border(windows, following, last, begin, fast_ticks, duration_ticks, trial)
     if end <= begin:
-        return -1
+        return NO_BORDER
     for j in range(trial.shape[0]):
         steps = trial[j, COUNT]
         if steps == 0:
             trial[j, FIRST] = trial[j, INTERVAL] = trial[j, ADD] = 0
             continue
         n = following[j]
-        low, high = np.empty(steps, np.int64), np.empty(steps, np.int64)
-        for i in range(steps):
-            low[i] = max(windows.steps[n + i, LOW], begin) - begin
-            high[i] = min(windows.steps[n + i, HIGH], end - 1) - begin
-        low[0] = earliest_tick(windows, n, last[j], begin) - begin
+        low, high = run_windows(windows, n, steps, last[j], begin, end)
         found, first, interval, add = fit_run(low, high, windows.least_interval[j])
         if not found:
             return -1
         trial[j, FIRST], trial[j, INTERVAL], trial[j, ADD] = first, interval, add
     return end
+
+
+@kernel
+def run_windows(windows: Windows, n: int, steps: int, last: int, begin: int, end: int) -> tuple[Ticks, Ticks]:
+    """Return the earliest and the latest tick, from `begin`, of the steps n, n + 1, ... of a segment."""
+    low, high = np.empty(steps, np.int64), np.empty(steps, np.int64)
+    for i in range(steps):
+        low[i] = max(windows.steps[n + i, LOW], begin) - begin
+        high[i] = min(windows.steps[n + i, HIGH], end - 1) - begin
+    low[0] = earliest_tick(windows, n, last, begin) - begin
+    return low, high
+
+
+@kernel
+def shorten(windows: Windows, n: int, last: int, begin: int, end: int, run: Ticks, least_interval: int) -> None:
+    """Give a run that fits the add that takes the fewest bytes."""
+    low, high = run_windows(windows, n, run[COUNT], last, begin, end)
+    found, first, interval, add = fit_smaller(low, high, least_interval, run[ADD])
+    if found:
+        run[FIRST], run[INTERVAL], run[ADD] = first, interval, add
 
 
 @kernel
@@ -142,13 +266,17 @@ def earliest_tick(windows: Windows, n: int, last: int, begin: int) -> int:
 
 
 @kernel
-def border(windows: Windows, following: Ticks, last: Ticks, begin: int, duration_ticks: int, trial: Ticks) -> int:
+def border(
+    windows: Windows, following: Ticks, last: Ticks, begin: int, fast_ticks: int, duration_ticks: int, trial: Ticks
+) -> int:
     """Return where a segment with trial[j, COUNT] steps of each joint j ends, or -1 when no border is possible.
 
-    After the earliest tick of its last steps and before the latest of those that follow; best in the middle between the
-    windows of both.
+    After the earliest tick of its last steps and before the latest of those that follow; best outside the windows of
+    both, shortly before the latter: then the next segment's `first_ticks` takes one byte.
     """
     earliest, latest = begin + 1, begin + MAX_SEGMENT_TICKS
+    if is_fast(windows, following, trial):
+        latest = begin + fast_ticks
     before, after = NEVER, -NEVER
     for j in range(trial.shape[0]):
         n = following[j] + trial[j, COUNT]
@@ -164,10 +292,26 @@ def border(windows: Windows, following: Ticks, last: Ticks, begin: int, duration
         end = duration_ticks if duration_ticks <= latest else begin + (duration_ticks - begin) // 2
     elif before == NEVER:
         end = after
+    elif after - before > 2 * FIRST_TICKS:
+        end = after - FIRST_TICKS
     else:
         end = before + (after - before) // 2
     end = min(max(end, earliest), latest)
     return end if earliest <= latest else -1
+
+
+@kernel
+def is_fast(windows: Windows, following: Ticks, trial: Ticks) -> bool:
+    """Tell whether any interval that a segment with these steps overlaps is that of a fast motor."""
+    for j in range(trial.shape[0]):
+        first, after = windows.first[j], windows.first[j + 1]
+        begin, end = following[j], min(following[j] + trial[j, COUNT], after - 1)  # the next step's interval as well
+        if end < begin:
+            continue
+        before = windows.steps[begin - 1, FAST] if begin > first else 0
+        if windows.steps[end, FAST] > before:
+            return True
+    return False
 
 
 @kernel

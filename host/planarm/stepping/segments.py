@@ -9,13 +9,13 @@ from planarm.stepping.expand import expand
 from planarm.stepping.greedy import ADD, COUNT, FIRST, INTERVAL, cut
 from planarm.stepping.plan import SegmentPlan
 from planarm.stepping.train import StepTrain, Ticks, require_steppable
-from planarm.stepping.windows import tolerance_ticks, windows_of
+from planarm.stepping.windows import EXACT_TO_1_US, Coding, tolerance_ticks, windows_of
 from planarm_wire.messages import Move, Segment
 
-__all__ = ["SegmentPlan", "compress", "expand"]
+__all__ = ["Coding", "SegmentPlan", "compress", "expand"]
 
 
-def compress(train: StepTrain) -> SegmentPlan:
+def compress(train: StepTrain, coding: Coding = EXACT_TO_1_US) -> SegmentPlan:
     """Return segments that make the train's steps: counts and directions exactly, times within their tolerance.
 
     The tolerance is `planarm.stepping.windows.tolerance_ticks`; no interval gets shorter than the train's shortest.
@@ -26,18 +26,18 @@ def compress(train: StepTrain) -> SegmentPlan:
     require_steppable(train)
     if train.duration_ticks == 0:
         return SegmentPlan((), 0, train.start_usteps)
-    windows = windows_of(train)
-    ends, runs = cut(windows, train.duration_ticks)
+    windows = windows_of(train, coding)
+    ends, runs = cut(windows, coding.fast_ticks, train.duration_ticks)
     plan = SegmentPlan(_segments(train, ends, runs), train.duration_ticks, train.start_usteps)
-    _require_same_steps(train, expand(plan))
+    _require_same_steps(train, expand(plan), coding)
     return plan
 
 
-def _segments(train: StepTrain, ends: list[int], runs: list[Ticks]) -> tuple[Segment, ...]:
+def _segments(train: StepTrain, ends: Ticks, runs: Ticks) -> tuple[Segment, ...]:
     """Return the wire's form of the runs; a run's direction is that of its first step in the train."""
     following = [0] * len(train.steps)
     segments = []
-    for k, (begin, end) in enumerate(pairwise([0, *ends])):
+    for k, (begin, end) in enumerate(pairwise([0, *ends.tolist()])):
         moves = []
         for j, run in enumerate(runs[k].tolist()):
             count = run[COUNT]
@@ -49,14 +49,14 @@ def _segments(train: StepTrain, ends: list[int], runs: list[Ticks]) -> tuple[Seg
     return tuple(segments)
 
 
-def _require_same_steps(wanted: StepTrain, made: StepTrain) -> None:
+def _require_same_steps(wanted: StepTrain, made: StepTrain, coding: Coding) -> None:
     """Check that the expanded segments are the train's steps; compression is never trusted."""
     if made.duration_ticks != wanted.duration_ticks:
         raise TimingError(f"the segments last {made.duration_ticks} ticks, the motion {wanted.duration_ticks}")
     for number, (steps, expanded) in enumerate(zip(wanted.steps, made.steps, strict=True), start=1):
         if not np.array_equal(steps.directions, expanded.directions):
             raise TimingError(f"the segments do not make the steps of joint {number} in number and direction")
-        moved = np.abs(expanded.ticks - steps.ticks) - tolerance_ticks(steps)
+        moved = np.abs(expanded.ticks - steps.ticks) - tolerance_ticks(steps, coding)
         if len(moved) and moved.max() > 0:
             n = int(moved.argmax())
             raise TimingError(

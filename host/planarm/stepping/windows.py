@@ -5,43 +5,89 @@ latest tick of a step leaves room for the least gap to the latest tick of the ne
 stay inside, and from any choice up to some step the rest can be chosen.
 """
 
-from typing import NamedTuple
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import sqrt
+from typing import NamedTuple, Self
 
 import numpy as np
 
+from planarm.scene import JointSpec
 from planarm.stepping.train import MIN_REVERSAL_TICKS, Directions, JointSteps, StepTrain, Ticks
 from planarm_wire.kernel_cache import kernel
-from planarm_wire.messages import MAX_INTERVAL_TICKS, MAX_SEGMENT_STEPS, MIN_DIR_SETUP_TICKS, MIN_INTERVAL_TICKS
+from planarm_wire.messages import (
+    MAX_INTERVAL_TICKS,
+    MAX_SEGMENT_STEPS,
+    MIN_DIR_SETUP_TICKS,
+    MIN_INTERVAL_TICKS,
+    TICKS_HZ,
+)
 
-TOLERANCE_TICKS = 6
-TOLERANCE_SHARE = 0.02
-"""A step may be moved by TOLERANCE_TICKS, or by this share of the shorter of the two intervals around it if larger."""
+
+@dataclass(frozen=True, slots=True)
+class Coding:
+    """What compression must keep to.
+
+    A step may be moved by the greater of `share` of the shorter interval around it and `ticks`, the latter at most
+    `most_share` of that interval: 1 us is much where steps are 20 us apart, and the arm's distance from the plan,
+    `planarm.stepping.quantise.TIMING_USTEPS`, has to hold there, too.
+
+    Attributes:
+        ticks: 16 are 1 us.
+        share: of the shorter interval.
+        most_share: of the shorter interval, the most that `ticks` may be.
+        fast_ticks: a segment may be no longer than this where any motor is above its start-stop speed.
+        start_stop_ticks: of each motor, the interval at that speed; a motor that is not listed has none, is never fast.
+    """
+
+    ticks: int = 16
+    share: float = 0.02
+    most_share: float = 0.04
+    fast_ticks: int = 65_536
+    start_stop_ticks: tuple[int, ...] = ()
+
+    @classmethod
+    def of(cls, axes: Sequence[JointSpec]) -> Self:
+        """Return the coding for motors with these axes' accelerations."""
+        return cls(start_stop_ticks=tuple(start_stop_ticks(axis) for axis in axes))
+
+
+def start_stop_ticks(axis: JointSpec) -> int:
+    """Return the interval at a motor's start-stop speed, sqrt(2 a) micro-steps/s.
+
+    From rest, with all of its acceleration, a motor has that speed after one micro-step: it may start or stop at it.
+    """
+    return int(TICKS_HZ / sqrt(2.0 * axis.max_acceleration_rad_s2 * axis.usteps_per_rad))
+
+
+EXACT_TO_1_US = Coding()
 
 
 class Windows(NamedTuple):
     """The steps of all joints, one joint after the other."""
 
     steps: Ticks
-    """Shape (steps of all joints, 6), with the columns below."""
+    """Shape (steps of all joints, 7), with the columns below."""
     first: Ticks
     """Index of each joint's first step, then the number of all, shape (joints + 1,)."""
     least_interval: Ticks
     """Least interval of each joint in one direction, shape (joints,)."""
 
 
-LOW, HIGH, GAP, SETUP, RUN_END, TICK = 0, 1, 2, 3, 4, 5
+LOW, HIGH, GAP, SETUP, RUN_END, TICK, FAST = 0, 1, 2, 3, 4, 5, 6
 """Columns of a step: earliest and latest tick; least ticks since the joint's step before; least ticks since the start
 of the step's segment, above 0 where DIR may change; index after the last step that may share a run with this one; the
-exact tick."""
+exact tick; how many of the joint's intervals up to this step are those of a fast motor."""
 
 
-def tolerance_ticks(steps: JointSteps) -> Ticks:
+def tolerance_ticks(steps: JointSteps, coding: Coding = EXACT_TO_1_US) -> Ticks:
     """Return by how much compression may move each step, shape (n,)."""
     gaps = np.diff(steps.ticks)
     if not len(gaps):
-        return np.full(len(steps.ticks), TOLERANCE_TICKS, np.int64)
+        return np.full(len(steps.ticks), coding.ticks, np.int64)
     shorter = np.minimum(np.append(gaps[0], gaps), np.append(gaps, gaps[-1]))
-    tolerance: Ticks = np.maximum(TOLERANCE_TICKS, (TOLERANCE_SHARE * shorter).astype(np.int64))
+    most = np.minimum(coding.ticks, coding.most_share * shorter)
+    tolerance: Ticks = np.maximum(most, coding.share * shorter).astype(np.int64)
     return tolerance
 
 
@@ -51,19 +97,21 @@ def least_interval_ticks(steps: JointSteps) -> int:
     return int(along.min()) if len(along) else MIN_INTERVAL_TICKS
 
 
-def windows_of(train: StepTrain) -> Windows:
+def windows_of(train: StepTrain, coding: Coding = EXACT_TO_1_US) -> Windows:
     """Return the windows of all steps."""
     first = np.cumsum([0, *(len(joint.ticks) for joint in train.steps)], dtype=np.int64)
     least = np.array([least_interval_ticks(joint) for joint in train.steps], np.int64)
-    steps = np.empty((first[-1], 6), np.int64)
+    steps = np.empty((first[-1], 7), np.int64)
     for j, joint in enumerate(train.steps):
         part = steps[first[j] : first[j + 1]]
-        tolerance = tolerance_ticks(joint)
+        tolerance = tolerance_ticks(joint, coding)
         part[:, TICK] = joint.ticks
         part[:, LOW] = joint.ticks - tolerance
         part[:, HIGH] = np.minimum(joint.ticks + tolerance, train.duration_ticks - 1)
         _tighten(joint.ticks, joint.directions, least[j], part)
         part[:, RUN_END] += first[j]
+        start_stop = coding.start_stop_ticks[j] if j < len(coding.start_stop_ticks) else 0
+        part[:, FAST] = np.cumsum(np.diff(joint.ticks, prepend=-(1 << 62)) < start_stop)
     return Windows(steps, first, least)
 
 
@@ -78,7 +126,7 @@ def _tighten(ticks: Ticks, directions: Directions, least_interval: int, steps: T
     for n in range(count - 1, -1, -1):
         if n + 1 < count:
             steps[n, HIGH] = min(steps[n, HIGH], steps[n + 1, HIGH] - steps[n + 1, GAP])
-        ends = n + 1 == count or steps[n + 1, SETUP] > 0 or ticks[n + 1] - ticks[n] > MAX_INTERVAL_TICKS
+        ends = n + 1 == count or steps[n + 1, SETUP] > 0 or steps[n + 1, LOW] - steps[n, HIGH] > MAX_INTERVAL_TICKS
         steps[n, RUN_END] = n + 1 if ends else steps[n + 1, RUN_END]
     for n in range(count):
         steps[n, RUN_END] = min(steps[n, RUN_END], n + MAX_SEGMENT_STEPS)
