@@ -32,7 +32,8 @@ from planarm.stepping.certify import Certificate, certify
 from planarm.stepping.quantise import quantisation_bound_cm, quantise
 from planarm.stepping.segments import Coding, SegmentPlan, compress, expand
 from planarm.summary import summarise
-from planarm.trajectory.timing import time_path
+from planarm.trajectory.limits import Limits
+from planarm.trajectory.timing import fastest_motion
 from planarm.workspace.check_task import check_task
 from planarm.workspace.free_map import FreeMap, build_free_map
 from planarm.workspace.joint_proof import joint_world
@@ -59,7 +60,7 @@ def plan_scene(scene: Scene, notice: Notice) -> Plan:
     free_map, path, search_s = shortest_path(scene)
     notice("plan", 0.4)
     smooth = smoothed(scene, free_map, path)
-    trajectory = time_path(smooth, scene.joints, scene.motion.acceleration_share)
+    trajectory = fastest_motion(smooth, Limits.of(scene))
     if trajectory.duration_s > LONGEST_MOTION_S:
         raise TimingError(
             f"{scene.source}: the motion would take {trajectory.duration_s:.6g} s, {LONGEST_MOTION_S:g} s are the "

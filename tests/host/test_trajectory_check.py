@@ -7,6 +7,7 @@ import pytest
 
 from motion_paths import JointCurve, joint_line, tip_path
 from planarm.trajectory.check import limit_use
+from planarm.trajectory.limits import Limits
 from planarm.trajectory.motion import Trajectory
 
 
@@ -26,7 +27,7 @@ def bump(height):
 
 
 def test_a_peak_of_speed_between_dense_points_is_covered():
-    use = limit_use(run_at_constant_rate(bump(4.0)), np.array([1.0, 1.0]), np.array([100.0, 100.0]))
+    use = limit_use(run_at_constant_rate(bump(4.0)), Limits(np.array([1.0, 1.0]), np.array([100.0, 100.0]), 1.0))
     at_points = 1.0 - 4.0 * 0.05**2
     assert use.speed[0, 0] >= 1.0
     assert use.speed[0, 0] <= 1.0 + 2.0 * (1.0 - at_points)
@@ -39,7 +40,7 @@ def test_a_peak_of_acceleration_between_dense_points_is_covered():
         lambda s: [s - 4.0 * (s - 0.55) ** 3 / 3.0, 0.0],
         lambda s: [1.0 - 4.0 * (s - 0.55) ** 2, 0.0],
     )
-    use = limit_use(run_at_constant_rate(path), np.array([100.0, 100.0]), np.array([1.0, 1.0]))
+    use = limit_use(run_at_constant_rate(path), Limits(np.array([100.0, 100.0]), np.array([1.0, 1.0]), 1.0))
     assert 1.0 <= use.acceleration[0, 0] <= 1.02
 
 
@@ -49,7 +50,9 @@ def test_use_is_that_of_the_closed_form_for_constant_acceleration():
     # s = t^2 for the first half second's sqrt(0.5), then the same to rest: s_ddot = +2, -2.
     s_dot = np.array([0.0, np.sqrt(2.0), 0.0])
     t_s = np.array([0.0, np.sqrt(0.5), 2.0 * np.sqrt(0.5)])
-    use = limit_use(Trajectory(line, t_s, s, s_dot, line.evaluate(s).q_rad), np.array([2.0, 1.0]), np.array([4.0, 4.0]))
+    use = limit_use(
+        Trajectory(line, t_s, s, s_dot, line.evaluate(s).q_rad), Limits(np.array([2.0, 1.0]), np.array([4.0, 4.0]), 1.0)
+    )
     assert use.acceleration == pytest.approx(np.array([[0.5, 0.25]] * 2))
     assert use.speed == pytest.approx(np.sqrt([[0.5, 0.5]] * 2))
     assert use.slack == pytest.approx([0.5, 0.5])
@@ -59,7 +62,7 @@ def test_each_interval_sees_its_own_side_of_a_border():
     # A corner blend of 2 cm between straight legs: q'' jumps at both its ends.
     path = tip_path([(40.0, 0.0), (40.0, 10.0), (30.0, 10.0)], tolerance_cm=0.5)
     made = Trajectory(path, path.borders_s, path.borders_s, np.ones(4), path.evaluate(path.borders_s).q_rad)
-    use = limit_use(made, np.array([1.0, 1.0]), np.array([1.0, 1.0])).acceleration
+    use = limit_use(made, Limits(np.array([1.0, 1.0]), np.array([1.0, 1.0]), 1.0)).acceleration
     for k, (a, b) in enumerate(pairwise(path.borders_s)):
         inside = np.abs(path.evaluate(np.linspace(a + 1e-9, b - 1e-9, 2001)).ddq_rad).max(axis=0)
         assert use[k] == pytest.approx(inside, rel=0.02)

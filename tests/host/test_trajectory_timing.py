@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from motion_paths import JointCurve, joint, joint_line, tip_path, tip_points, waves
 from planarm.errors import TimingError
 from planarm.trajectory.check import limit_use
+from planarm.trajectory.limits import Limits
 from planarm.trajectory.timing import time_path
 
 
@@ -64,7 +65,7 @@ def test_no_limit_is_exceeded_and_the_motion_uses_one(seed, cornered, speeds, ac
     assert (speed.max(axis=0) <= speeds).all()
     assert (acceleration.max(axis=0) <= 0.8 * np.array(accelerations) + noise).all()
     # Fastest: nearly everywhere some limit is used up.
-    use = limit_use(made, np.array(speeds), 0.8 * np.array(accelerations))
+    use = limit_use(made, Limits(np.array(speeds), 0.8 * np.array(accelerations), 1.0))
     used = np.maximum(use.speed, use.acceleration).max(axis=1)
     assert np.median(used) > 0.99
 

@@ -79,4 +79,5 @@ def test_the_largest_start_is_that_of_linear_programming(strips, limits):
         method="highs",
     )
     assert solved.status == 0
-    assert largest_start(lines, widths, limits[0], limits[1]) == pytest.approx(solved.x[0], rel=1e-6, abs=1e-6)
+    both = np.concatenate([lines, -lines]), np.concatenate([widths, widths])
+    assert largest_start(*both, limits[0], limits[1]) == pytest.approx(solved.x[0], rel=1e-6, abs=1e-6)

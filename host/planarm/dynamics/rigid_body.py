@@ -175,10 +175,24 @@ def path_torques(body: RigidBody, q_rad: Floats, dq_rad: Floats, ddq_rad: Floats
         dq_rad: their first derivatives by the path parameter s.
         ddq_rad: their second derivatives.
     """
-    a, b, g = np.empty_like(q_rad), np.empty_like(q_rad), np.empty_like(q_rad)
-    still = np.zeros(q_rad.shape[1])
-    for i in range(q_rad.shape[0]):
-        g[i] = inverse_dynamics(body, q_rad[i], still, still)
-        a[i] = inverse_dynamics(body, q_rad[i], still, dq_rad[i]) - g[i]
-        b[i] = inverse_dynamics(body, q_rad[i], dq_rad[i], ddq_rad[i]) - g[i]
+    points, count = q_rad.shape
+    # Each array is taken out of the tuple once: Numba counts a reference every time.
+    products, moments = body.products_kg_m2, body.moments_kg_m
+    gravity_x, gravity_y = body.gravity_m_s2[0], body.gravity_m_s2[1]
+    a, b, g = np.empty((points, count)), np.empty((points, count)), np.empty((points, count))
+    cosine, sine, turn, spin = np.empty(count), np.empty(count), np.empty(count), np.empty(count)
+    for i in range(points):
+        phi, dphi, ddphi = 0.0, 0.0, 0.0
+        for j in range(count):
+            phi, dphi, ddphi = phi + q_rad[i, j], dphi + dq_rad[i, j], ddphi + ddq_rad[i, j]
+            cosine[j], sine[j], turn[j], spin[j] = np.cos(phi), np.sin(phi), dphi, ddphi
+        from_u, from_x, held = 0.0, 0.0, 0.0
+        for j in range(count - 1, -1, -1):
+            held += moments[j] * (gravity_x * sine[j] - gravity_y * cosine[j])
+            for k in range(count):
+                apart_cosine = products[j, k] * (cosine[j] * cosine[k] + sine[j] * sine[k])
+                apart_sine = products[j, k] * (sine[j] * cosine[k] - cosine[j] * sine[k])
+                from_u += apart_cosine * turn[k]
+                from_x += apart_cosine * spin[k] + apart_sine * turn[k] * turn[k]
+            a[i, j], b[i, j], g[i, j] = from_u, from_x, held
     return a, b, g

@@ -3,7 +3,7 @@
 from planarm.scene.strict_toml import Table
 from planarm.scene.types import Corners, MotionSpec
 
-MOTION_KEYS = ("corners", "tolerance_cm", "acceleration_share")
+MOTION_KEYS = ("corners", "tolerance_cm", "acceleration_share", "torque_share")
 CORNERS: tuple[Corners, ...] = ("blend", "stop")
 SMALLEST_TOLERANCE_CM = 1e-3
 LARGEST_TOLERANCE_CM = 100.0
@@ -21,4 +21,5 @@ def read_motion(table: Table) -> MotionSpec:
         acceleration_share=table.number(
             "acceleration_share", default.acceleration_share, at_least=SMALLEST_SHARE, at_most=1.0
         ),
+        torque_share=table.number("torque_share", default.torque_share, at_least=SMALLEST_SHARE, at_most=1.0),
     )

@@ -99,6 +99,8 @@ class MotionSpec:
     """Largest distance of the tip from the path's straight moves."""
     acceleration_share: float = 0.8
     """Share of each joint's acceleration that the plan uses; the rest keeps a stop along the path possible."""
+    torque_share: float = 0.5
+    """Share of the motors' pull-out torque that may be used at all: the model is an estimate."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,31 +1,31 @@
-"""Time a joint path: as fast as every joint's speed and a share of its acceleration allow.
+"""Time a joint path: as fast as every joint's speed, a share of its acceleration, and its motor's torque allow.
 
 Solve on a grid, look at the result on a grid ten times denser, split the intervals in which a limit is exceeded
 notably or in which time is lost, tighten those in which it is exceeded a little, solve again; what is left in the end
-is removed by running the whole motion slower. So the returned trajectory never exceeds a limit.
+is removed by running the whole motion slower. So the returned trajectory never exceeds a limit. The torque's estimate
+(`planarm.trajectory.planes`) is drawn anew about each solution.
 """
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from planarm.dynamics.motor_terms import Load
 from planarm.errors import TimingError
 from planarm.scene import JointSpec
 from planarm.smoothing.smooth_path import Floats, SmoothPath
 from planarm.trajectory.check import LimitUse, limit_use
+from planarm.trajectory.limits import STOPPING_SHARE, Limits
 from planarm.trajectory.motion import Trajectory
+from planarm.trajectory.planes import Grid, half_planes, path_ends, require_holding, squared_limits, with_turning_points
 from planarm.trajectory.topp import fastest_squared_speeds
 
-__all__ = ["STOPPING_SHARE", "Trajectory", "time_path"]
+__all__ = ["STOPPING_SHARE", "SpeedCap", "Trajectory", "fastest_motion", "time_path"]
 
-STOPPING_SHARE = 0.8
-"""Share of each joint's acceleration that a plan uses; what is left keeps a stop along the path possible."""
-
-HEADROOM = 1.0 - 1e-4
-"""Planned share of each limit. The dense check knows what happens between its points to second order; this covers the
-rest many times."""
+SpeedCap = Callable[[Floats], Floats]
+"""Gives the largest ds/dt, shape (m,), at path parameters of shape (m,); held at the gridpoints."""
 
 FIRST_STEP_RAD = 0.02
 MIN_INTERVALS = 8
@@ -37,69 +37,70 @@ LOST_SHARE = 1e-4
 """An interval that exceeds a limit beyond SPLIT_ABOVE, or loses this share of the duration, is split, else
 tightened where it exceeds a limit; from SLOW_BELOW on, or after ROUNDS, the whole motion is run slower by the rest."""
 
+GROWTH = 2.0
+"""How many times the squared path speed of a solution the next may have while torque limits it."""
 
-@dataclass(frozen=True, slots=True)
-class _Limits:
-    """What the joints may do, shape (joints,) each."""
-
-    speeds_rad_s: Floats
-    accelerations_rad_s2: Floats
+SETTLED_SHARE = 1e-4
+"""The torque's estimate is good enough when drawing it anew changes the duration by less than this share."""
 
 
-@dataclass(frozen=True, slots=True)
-class _Grid:
-    """Gridpoints and, for each interval and joint, the shares of the limits that the solver may use."""
-
-    s: Floats
-    speed_share: Floats
-    acceleration_share: Floats
-
-
-def time_path(path: SmoothPath, joints: Sequence[JointSpec], share: float = STOPPING_SHARE) -> Trajectory:
+def time_path(
+    path: SmoothPath,
+    joints: Sequence[JointSpec],
+    share: float = STOPPING_SHARE,
+    load: Load | None = None,
+    speed_cap: SpeedCap | None = None,
+) -> Trajectory:
     """Return the fastest motion along the path, at rest at its ends and stops.
 
     Args:
         path: the path; when all of it is one pose, the trajectory has no duration.
         joints: the joints' limits, one for each column of the path.
-        share: the share of each joint's acceleration to use, in (0, 1].
+        share: the share of each joint's acceleration, and of the torque that gravity and friction leave, to use: in
+            (0, 1].
+        load: masses and motors; None when torque is not to be limited.
+        speed_cap: a further limit of ds/dt.
 
     Raises:
-        TimingError: a limit or the path is no finite number; the message names joint and place.
+        TimingError: a limit or the path is no finite number, or a motor cannot hold the arm; the message names joint
+            and place.
     """
-    limits = _limits_of(joints, share)
-    s = _first_gridpoints(path, len(joints))
+    return fastest_motion(path, Limits.of_joints(joints, share, load), speed_cap)
+
+
+def fastest_motion(path: SmoothPath, limits: Limits, speed_cap: SpeedCap | None = None) -> Trajectory:
+    """Return the fastest motion along the path within the limits; see `time_path`."""
+    s = _first_gridpoints(path, limits.joints)
+    if limits.load is not None:
+        s = with_turning_points(path, s)
     if not np.ptp(path.evaluate(s).q_rad, axis=0).any():
         return Trajectory(path, np.zeros(1), s[:1], np.zeros(1), path.evaluate(s[:1]).q_rad)
-    ones = np.ones((len(s) - 1, len(joints)))
-    grid = _Grid(s, ones, ones)
-    trajectory = _solve(path, grid, limits)
+    ones = np.ones((len(s) - 1, limits.joints))
+    grid = Grid(s, ones, ones, ones, np.zeros(len(s)))
+    grid, trajectory = _refined(path, grid, replace(limits, load=None), speed_cap)
+    if limits.load is None:
+        return trajectory
+    require_holding(path, grid.s, limits)
+    if limit_use(trajectory, limits).torque.max() <= 1.0:
+        return trajectory  # the fastest without the torque's limit keeps it
+    return _refined(path, replace(grid, tangent_x=trajectory.s_dot**2), limits, speed_cap)[1]
+
+
+def _refined(path: SmoothPath, grid: Grid, limits: Limits, speed_cap: SpeedCap | None) -> tuple[Grid, Trajectory]:
+    """Solve, look, refine and solve again; return the last grid, and the motion made to keep every limit."""
+    trajectory = solve(path, grid, limits, speed_cap)
+    before_s, use = np.inf, limit_use(trajectory, limits)
     for _ in range(ROUNDS):
-        use = limit_use(trajectory, limits.speeds_rad_s, limits.accelerations_rad_s2)
         coarse = _coarse(trajectory, use)
-        if max(use.speed.max(), use.acceleration.max()) <= SLOW_BELOW and not coarse.any():
+        change_s = abs(before_s - trajectory.duration_s)
+        settled = limits.load is None or change_s <= SETTLED_SHARE * trajectory.duration_s
+        if use.largest <= SLOW_BELOW and not coarse.any() and settled:
             break
-        grid = _refine(grid, use, coarse)
-        trajectory = _solve(path, grid, limits)
-    else:
-        use = limit_use(trajectory, limits.speeds_rad_s, limits.accelerations_rad_s2)
-    return _slowed(trajectory, max(1.0, float(use.speed.max()), float(np.sqrt(use.acceleration.max()))))
-
-
-def _limits_of(joints: Sequence[JointSpec], share: float) -> _Limits:
-    """Check the limits and return what a plan may use of them."""
-    if not 0.0 < share <= 1.0:
-        raise TimingError(f"the share of the acceleration is {share}; it must be above 0 and at most 1")
-    for number, joint in enumerate(joints, start=1):
-        for key, value in (
-            ("max_speed_deg_s", np.degrees(joint.max_speed_rad_s)),
-            ("max_acceleration_deg_s2", np.degrees(joint.max_acceleration_rad_s2)),
-        ):
-            if not (np.isfinite(value) and value > 0.0):
-                raise TimingError(f"joint {number} cannot be timed: joints[{number}].{key} is {value}; set it above 0")
-    return _Limits(
-        HEADROOM * np.array([joint.max_speed_rad_s for joint in joints]),
-        HEADROOM * share * np.array([joint.max_acceleration_rad_s2 for joint in joints]),
-    )
+        before_s = trajectory.duration_s
+        grid = _refine(grid, trajectory, use, coarse, np.inf if limits.load is None else GROWTH)
+        trajectory = solve(path, grid, limits, speed_cap)
+        use = limit_use(trajectory, limits)
+    return grid, _slowed(trajectory, _slowing(use))
 
 
 def _first_gridpoints(path: SmoothPath, joints: int) -> Floats:
@@ -135,43 +136,26 @@ def _finite_angles(path: SmoothPath, s: Floats, joints: int) -> Floats:
     return path.evaluate(s).q_rad
 
 
-def _solve(path: SmoothPath, grid: _Grid, limits: _Limits) -> Trajectory:
-    """Return the fastest motion on the grid."""
+def solve(path: SmoothPath, grid: Grid, limits: Limits, speed_cap: SpeedCap | None = None) -> Trajectory:
+    """Return the fastest motion on the grid, held to the limits at both ends of every interval.
+
+    Raises:
+        TimingError: a motor cannot hold the arm, or nothing moves in some interval.
+    """
     s = grid.s
-    h = np.diff(s)[:, None]
-    start, end = path.evaluate(s[:-1], "right"), path.evaluate(s[1:], "left")
-    inertia_start, inertia_end = start.dq_rad / (2.0 * h), end.dq_rad / (2.0 * h)
-    strips = np.concatenate(
-        [
-            np.stack([start.ddq_rad - inertia_start, inertia_start], axis=-1),
-            np.stack([-inertia_end, end.ddq_rad + inertia_end], axis=-1),
-        ],
-        axis=1,
-    )
-    accelerations = np.tile(limits.accelerations_rad_s2 * grid.acceleration_share, (1, 2))
-    x = fastest_squared_speeds(
-        np.ascontiguousarray(strips), accelerations, _squared_limits(path, grid, limits, start.dq_rad, end.dq_rad)
-    )
+    ends = path_ends(path, s, limits)
+    rest = np.flatnonzero(np.isin(s, path.stops_s))
+    x_limits = squared_limits(ends, grid, limits, np.concatenate([[0], rest, [len(s) - 1]]))
+    if speed_cap is not None:
+        x_limits = np.minimum(x_limits, speed_cap(s) ** 2)
+    x = fastest_squared_speeds(*half_planes(ends, grid, limits, x_limits), x_limits)
     s_dot = np.sqrt(x)
     stuck = np.flatnonzero(s_dot[:-1] + s_dot[1:] <= 0.0)
     if len(stuck):
         raise TimingError(f"no speed is possible at {path.place(float(s[stuck[0]]))}: the path turns there on the spot")
-    t_s = np.concatenate([[0.0], np.cumsum(2.0 * h[:, 0] / (s_dot[:-1] + s_dot[1:]))])
-    return Trajectory(path, t_s, s, s_dot, path.evaluate(s).q_rad)
-
-
-def _squared_limits(path: SmoothPath, grid: _Grid, limits: _Limits, dq_start: Floats, dq_end: Floats) -> Floats:
-    """Return the largest x by the speed limits at each gridpoint: the least over both sides and all joints."""
-    allowed = limits.speeds_rad_s * grid.speed_share
-    # A gridpoint at which no joint moves gets the largest limit found elsewhere.
-    rate = np.full(len(grid.s), np.inf)
-    for dq, at in ((dq_start, slice(None, -1)), (dq_end, slice(1, None))):
-        bound = np.divide(allowed, np.abs(dq), out=np.full(dq.shape, np.inf), where=dq != 0.0).min(axis=1)
-        rate[at] = np.minimum(rate[at], bound)
-    rate[np.isinf(rate)] = rate[np.isfinite(rate)].max()
-    rate[[0, -1]] = 0.0
-    rate[np.isin(grid.s, path.stops_s)] = 0.0
-    return rate**2
+    t_s = np.concatenate([[0.0], np.cumsum(2.0 * np.diff(s) / (s_dot[:-1] + s_dot[1:]))])
+    q_rad = np.concatenate([ends.start.q_rad, ends.end.q_rad[-1:]])
+    return Trajectory(path, t_s, s, s_dot, q_rad)
 
 
 def _coarse(trajectory: Trajectory, use: LimitUse) -> NDArray[np.bool_]:
@@ -181,25 +165,36 @@ def _coarse(trajectory: Trajectory, use: LimitUse) -> NDArray[np.bool_]:
     its acceleration is constant; it loses at most the unused share of its time.
     """
     lost_s = use.slack * np.diff(trajectory.t_s)
-    coarse = (np.maximum(use.speed, use.acceleration).max(axis=1) > SPLIT_ABOVE) | (
-        lost_s > LOST_SHARE * trajectory.duration_s
-    )
+    most = np.maximum(np.maximum(use.speed, use.acceleration), use.torque).max(axis=1)
+    coarse = (most > SPLIT_ABOVE) | (lost_s > LOST_SHARE * trajectory.duration_s)
     return coarse if len(coarse) + np.count_nonzero(coarse) <= MAX_INTERVALS else np.zeros(len(coarse), np.bool_)
 
 
-def _refine(grid: _Grid, use: LimitUse, coarse: NDArray[np.bool_]) -> _Grid:
-    """Split the coarse intervals, tighten the others where they exceed a limit a little."""
-    tight = ~coarse[:, None]
-    speed = np.where(tight, grid.speed_share / np.maximum(1.0, use.speed), grid.speed_share)
-    acceleration = np.where(tight, grid.acceleration_share / np.maximum(1.0, use.acceleration), grid.acceleration_share)
+def _refine(grid: Grid, trajectory: Trajectory, use: LimitUse, coarse: NDArray[np.bool_], growth: float) -> Grid:
+    """Split the coarse intervals, tighten the others where they exceed a limit a little, draw the tangents anew."""
     repeats = 1 + coarse
+    speed_share, acceleration_share, torque_share = (
+        np.repeat(np.where(coarse[:, None], share, share / np.maximum(1.0, used)), repeats, axis=0)
+        for share, used in (
+            (grid.speed_share, use.speed),
+            (grid.acceleration_share, use.acceleration),
+            (grid.torque_share, use.torque),
+        )
+    )
     middles = 0.5 * (grid.s[:-1] + grid.s[1:])
     s = np.sort(np.concatenate([grid.s, middles[coarse]]))
-    return _Grid(s, np.repeat(speed, repeats, axis=0), np.repeat(acceleration, repeats, axis=0))
+    tangent_x = np.interp(s, trajectory.s, trajectory.s_dot**2)
+    return Grid(s, speed_share, acceleration_share, torque_share, tangent_x, growth)
+
+
+def _slowing(use: LimitUse) -> float:
+    """Return the factor by which the whole motion has to be slower to keep all limits.
+
+    Speeds fall with the factor, accelerations with its square; torque by friction only with the factor itself.
+    """
+    return max(1.0, float(use.speed.max()), float(np.sqrt(use.acceleration.max())), float(use.torque.max()))
 
 
 def _slowed(trajectory: Trajectory, factor: float) -> Trajectory:
     """Return the same motion run slower: speeds by the factor, accelerations by its square."""
-    return Trajectory(
-        trajectory.path, trajectory.t_s * factor, trajectory.s, trajectory.s_dot / factor, trajectory.q_rad
-    )
+    return replace(trajectory, t_s=trajectory.t_s * factor, s_dot=trajectory.s_dot / factor)

@@ -2,12 +2,12 @@
 
 With x = (ds/dt)^2 and u = d2s/dt2, the motion of a joint is speed |q'| sqrt(x) and acceleration q' u + q'' x, and over
 an interval of length h with constant u, x grows linearly: y = x + 2 h u. So in the plane of x at the start and y at the
-end of an interval, each acceleration limit is a strip |c x + d y| <= A around the origin. Each interval has one
-strip a joint for its start and one for its end, with the derivatives as seen from inside the interval, so a jump of q''
-at a border is felt from both sides.
+end of an interval, each limit that is linear in x and u is a half-plane c x + d y <= e. Each interval has such
+half-planes for its start and for its end, with the derivatives as seen from inside the interval, so a jump of q'' at a
+border is felt from both sides.
 
-Limits are symmetric, so x = y = 0 is always feasible and the states from which the end can be reached at rest are
-x in [0, controllable]. The backward pass finds them; the forward pass takes the largest y at every step.
+Rest is always possible, e >= 0, so the states from which the end can be reached at rest are x in [0, controllable]. The
+backward pass finds them; the forward pass takes the largest y at every step.
 """
 
 import numpy as np
@@ -17,7 +17,7 @@ from planarm_wire.kernel_cache import kernel
 
 Floats = NDArray[np.float64]
 
-MAX_CUTS = 64
+MAX_CUTS = 256
 """More than the pairs of lines that can bound x; each cut is done with at least one of them."""
 
 INSIDE = 1.0 - 1e-12
@@ -25,37 +25,37 @@ INSIDE = 1.0 - 1e-12
 
 
 @kernel
-def fastest_squared_speeds(strips: Floats, accelerations: Floats, squared_limits: Floats) -> Floats:
+def fastest_squared_speeds(planes: Floats, bounds: Floats, squared_limits: Floats) -> Floats:
     """Return the greatest x at each gridpoint, at rest where `squared_limits` is 0.
 
     Args:
-        strips: (c, d) of each strip, shape (intervals, strips, 2).
-        accelerations: A of each strip, shape (intervals, strips).
+        planes: (c, d) of each half-plane, shape (intervals, planes, 2).
+        bounds: e of each half-plane, at least 0, shape (intervals, planes).
         squared_limits: largest x by the joints' speeds, shape (intervals + 1,).
 
     Returns:
         x at the gridpoints, shape (intervals + 1,).
     """
-    intervals = strips.shape[0]
+    intervals = planes.shape[0]
     x = squared_limits.copy()
     for i in range(intervals - 1, -1, -1):
-        x[i] = INSIDE * largest_start(strips[i], accelerations[i], squared_limits[i], x[i + 1])
+        x[i] = INSIDE * largest_start(planes[i], bounds[i], squared_limits[i], x[i + 1])
     for i in range(intervals):
-        _, highest, _ = end_range(strips[i], accelerations[i], x[i], x[i + 1])
+        _, highest, _ = end_range(planes[i], bounds[i], x[i], x[i + 1])
         x[i + 1] = max(0.0, highest)
     return x
 
 
 @kernel
-def largest_start(strips: Floats, accelerations: Floats, limit: float, end_limit: float) -> float:
-    """Return the largest x in [0, limit] for which some y in [0, end_limit] lies in all strips.
+def largest_start(planes: Floats, bounds: Floats, limit: float, end_limit: float) -> float:
+    """Return the largest x in [0, limit] for which some y in [0, end_limit] lies in all half-planes.
 
     The room for y, highest less lowest, is a concave function of x that is not negative at 0, so cutting x back to
     where the two lines that now bound y meet never cuts off the answer and ends at it.
     """
     x = limit
     for _ in range(MAX_CUTS):
-        lowest, highest, closing = end_range(strips, accelerations, x, end_limit)
+        lowest, highest, closing = end_range(planes, bounds, x, end_limit)
         room = highest - lowest
         if room >= 0.0 or closing >= 0.0:
             return x
@@ -67,20 +67,21 @@ def largest_start(strips: Floats, accelerations: Floats, limit: float, end_limit
 
 
 @kernel
-def end_range(strips: Floats, accelerations: Floats, x: float, end_limit: float) -> tuple[float, float, float]:
-    """Return (lowest y, highest y, d(highest - lowest)/dx) in all strips for a given x; lowest > highest: none."""
+def end_range(planes: Floats, bounds: Floats, x: float, end_limit: float) -> tuple[float, float, float]:
+    """Return (lowest y, highest y, d(highest - lowest)/dx) in all half-planes for a given x; lowest > highest: none."""
     lowest, lowest_slope = 0.0, 0.0
     highest, highest_slope = end_limit, 0.0
-    for k in range(strips.shape[0]):
-        c, d = strips[k, 0], strips[k, 1]
+    for k in range(planes.shape[0]):
+        c, d = planes[k, 0], planes[k, 1]
         if d == 0.0:
-            # A strip along y bounds x itself: no room beyond it, closing with the slope |c|.
-            if abs(c) * x > accelerations[k]:
-                return 0.0, accelerations[k] - abs(c) * x, -abs(c)
+            # A line along y bounds x itself: no room beyond it, closing with the slope c.
+            if c * x > bounds[k]:
+                return 0.0, bounds[k] - c * x, -c
             continue
-        slope, half = -c / d, accelerations[k] / abs(d)
-        if slope * x - half > lowest:
-            lowest, lowest_slope = slope * x - half, slope
-        if slope * x + half < highest:
-            highest, highest_slope = slope * x + half, slope
+        slope, at = -c / d, (bounds[k] - c * x) / d
+        if d < 0.0:
+            if at > lowest:
+                lowest, lowest_slope = at, slope
+        elif at < highest:
+            highest, highest_slope = at, slope
     return lowest, highest, highest_slope - lowest_slope
