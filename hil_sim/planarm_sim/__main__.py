@@ -6,12 +6,14 @@ import argparse
 import sys
 from collections.abc import Sequence
 
-from planarm_sim.emulate import Emulation, emulate
+from planarm_sim.emulate import Emulation, Watch, emulate
 from planarm_sim.errors import SimError
+from planarm_sim.insight import Insight
 from planarm_wire import messages
 
-__all__ = ["main", "summary"]
+__all__ = ["add_watch_options", "main", "summary", "watch_of"]
 
+SHOWN_FUNCTIONS = 10
 EXIT_OK, EXIT_BAD_INPUT, EXIT_PROGRAM_FAILED = 0, 2, 6
 
 
@@ -27,7 +29,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     )
     parser.add_argument("--bootloader", metavar="FILE", help="boot loader to start at resets; it takes uploads")
     parser.add_argument("--link", metavar="PATH", help="make PATH a link to the terminal")
-    parser.add_argument("--vcd", metavar="FILE", help="write the pins' waveforms")
+    add_watch_options(parser)
     parser.add_argument("--speed", choices=("real", "max"), default="real", help="default: %(default)s")
     parser.add_argument("--baud", type=int, default=messages.BAUD, help="of the serial line; default: %(default)s")
     parser.add_argument("--seconds", type=float, help="emulated time to run; default: until stopped")
@@ -38,7 +40,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             options.image,
             bootloader=options.bootloader,
             link=options.link,
-            vcd=options.vcd,
+            watch=watch_of(options),
             speed=options.speed,
             baud=options.baud,
             seconds=options.seconds,
@@ -55,14 +57,51 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return EXIT_PROGRAM_FAILED if result.program_failed else EXIT_OK
 
 
+def add_watch_options(parser: argparse.ArgumentParser) -> None:
+    """Add what `watch_of` reads; the same options wherever boards are emulated."""
+    parser.add_argument("--vcd", metavar="FILE", help="write the pins' waveforms")
+    parser.add_argument("--serial-log", metavar="FILE", help="write every byte on the serial line and its cycles")
+    parser.add_argument(
+        "--profile", metavar="FILE", help="write interrupts, load, stack and cycles per function (JSON); runs slower"
+    )
+    parser.add_argument("--symbols", metavar="ELF", help="where --profile finds the functions of an Intel HEX image")
+    parser.add_argument("--gdb", type=int, metavar="PORT", help="let avr-gdb attach: target remote localhost:PORT")
+
+
+def watch_of(options: argparse.Namespace) -> Watch:
+    """What the options ask to be recorded."""
+    return Watch(options.vcd, options.serial_log, options.profile, options.symbols, options.gdb)
+
+
 def summary(result: Emulation) -> str:
-    """The closing line."""
+    """The closing lines."""
     edges = ", ".join(f"{name} {count}" for name, count in result.rising_edges.items()) or "none"
-    return (
+    told = (
         f"{result.ended}; {result.cycles} cycles in {result.clock_s:.2f} s ({result.ratio:.2f} x real time); "
         f"rising edges: {edges}; serial: opened {result.counts.opened} x, {result.counts.from_host_bytes} bytes in, "
         f"{result.counts.to_host_bytes} out, {result.counts.lost_bytes} lost"
     )
+    return told if result.insight is None else f"{told}\n{insight_summary(result.insight)}"
+
+
+def insight_summary(insight: Insight) -> str:
+    """Load, stack, interrupts and the most expensive functions, a line each."""
+    lines = [
+        f"processor: {insight.load:.1%} awake, {insight.interrupt_share:.1%} in interrupts; "
+        f"deepest stack {insight.deepest_stack_bytes} bytes"
+    ]
+    for figures in insight.interrupts:
+        latency, duration = figures.latency_cycles, figures.duration_cycles
+        lines.append(
+            f"{figures.name}: {figures.count} x, latency {latency.mean:.1f} cycles (p99 {latency.p99}, most "
+            f"{latency.most}), duration {duration.mean:.1f} (p99 {duration.p99}, most {duration.most})"
+        )
+    for function in insight.functions[:SHOWN_FUNCTIONS]:
+        lines.append(
+            f"{function.name}: {function.self_cycles / insight.cycles:.1%} by itself, "
+            f"{function.inclusive_cycles / insight.cycles:.1%} with what it calls, {function.calls} calls"
+        )
+    return "\n".join(lines)
 
 
 def _print_line(text: str) -> None:

@@ -10,19 +10,20 @@ from dataclasses import dataclass
 from pathlib import Path
 from types import FrameType
 
-import numpy as np
-
-from planarm_sim.board import PINS, Uno, pin_name
+from planarm_sim.board import CLOCK_HZ, Uno
 from planarm_sim.bridge import BOOT_S, Bridge, BridgeCounts, Clock, Line, Speed, WallClock
+from planarm_sim.cpu.chip import StopCause
+from planarm_sim.debug import GdbServer
 from planarm_sim.errors import BridgeError, StoppedError
-from planarm_sim.loader import Image, load_image
-from planarm_sim.trace import VcdWriter
+from planarm_sim.insight import Insight
+from planarm_sim.loader import Image, load_elf, load_image
+from planarm_sim.recording import NO_WATCH, TRACED_PINS, Sink, Watch, write_profile
 from planarm_wire import messages
 
-__all__ = ["TRACED_PINS", "Emulation", "Stop", "emulate", "run_board"]
+__all__ = ["TRACED_PINS", "Emulation", "Stop", "Watch", "emulate", "run_board"]
 
-TRACED_PINS = tuple(pin.name for pin in PINS if pin.name not in ("D0", "D1"))
-"""Pins in the waveform file and in the counts: all but the serial line's."""
+DEBUGGER_WAIT_S = 0.05
+"""How long a board that a debugger holds may not notice that it is to stop."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,6 +38,7 @@ class Emulation:
         ended: why it ended: "stopped", "time is up", or what the program ran into.
         program_failed: whether the program ended by itself (undefined opcode, BREAK, asleep for ever).
         warnings: registers of parts that are not modelled which the program touched.
+        insight: what watching the program told; None when nobody asked for it.
     """
 
     cycles: int
@@ -46,6 +48,7 @@ class Emulation:
     ended: str
     program_failed: bool
     warnings: tuple[str, ...]
+    insight: Insight | None = None
 
     @property
     def ratio(self) -> float:
@@ -58,7 +61,7 @@ def emulate(
     *,
     bootloader: str | Path | None = None,
     link: str | Path | None = None,
-    vcd: str | Path | None = None,
+    watch: Watch = NO_WATCH,
     speed: Speed = "real",
     baud: int = messages.BAUD,
     seconds: float | None = None,
@@ -72,7 +75,7 @@ def emulate(
         image_path: program, Intel HEX or ELF; None with a boot loader alone.
         bootloader: boot loader, Intel HEX or ELF, that runs after every reset; programs can be uploaded to it.
         link: path at which the terminal can be opened, too.
-        vcd: waveform file to write, all pins but the serial line's.
+        watch: what to record, and whether a debugger may attach.
         speed: "real" or "max"; see `planarm_sim.bridge.bridge`.
         baud: rate of the serial line; a pseudo-terminal does not tell what its host sets.
         seconds: emulated time to run; None runs on.
@@ -84,7 +87,7 @@ def emulate(
         ImageError: the program cannot be loaded.
         UsageError: neither program nor boot loader.
         BridgeError: no terminal, or no link to it, can be had.
-        TraceError: the waveform file cannot be written.
+        TraceError: a file cannot be written.
     """
     try:
         from planarm_sim.bridge.pty_line import PtyLine  # noqa: PLC0415 - needs POSIX
@@ -93,6 +96,8 @@ def emulate(
             "this system has no pseudo-terminals; use planarm --port sim://, which needs none, or Linux or macOS"
         ) from error
     uno = Uno(_load(image_path), baud=baud, bootloader=_load(bootloader))
+    if watch.symbols is not None:
+        load_elf(watch.symbols)  # what is wrong with it is told before anything is announced
     uno.run(cycles=1)  # compiles the chip, or loads it from the cache: a host that opens the terminal need not wait
     with _stopped_by_signals() as stop, PtyLine(link) as line:
         announce(line.path)
@@ -101,7 +106,7 @@ def emulate(
             line,
             WallClock(),
             stop,
-            vcd=vcd,
+            watch=watch,
             speed=speed,
             seconds=seconds,
             reset_on_open=reset_on_open,
@@ -119,71 +124,64 @@ def run_board(
     clock: Clock,
     stop: Stop,
     *,
-    vcd: str | Path | None = None,
+    watch: Watch = NO_WATCH,
     speed: Speed = "real",
     seconds: float | None = None,
     reset_on_open: bool = True,
     say: Callable[[str], None],
 ) -> Emulation:
     """As `emulate`, with a board, a line, a clock and a way to stop it of the caller's."""
+    if watch.profile is not None:
+        uno.observe(symbols=watch.symbols, keep_intervals=False)
     uno.run(cycles=1)  # compiles the chip, if nobody has: seconds that are nobody's lag
     start_cycle, start_s = uno.cycle, clock.now_s()
     with ExitStack() as stack:
-        edges = _EdgeSink(uno, stack.enter_context(_open_vcd(uno, vcd)) if vcd is not None else None)
+        sink = stack.enter_context(Sink(uno, watch))
+        debugger = None
+        if watch.gdb_port is not None:
+            debugger = stack.enter_context(GdbServer(watch.gdb_port, uno.debug_target))
+            say(f"avr-gdb attaches by: target remote localhost:{debugger.port}")
         bridge = Bridge(
-            uno, line, clock, speed=speed, boot_s=BOOT_S if reset_on_open else None, say=say, after_run=edges.take
+            uno, line, clock, speed=speed, boot_s=BOOT_S if reset_on_open else None, say=say, after_run=sink.take
         )
-        ended, failed = "stopped", False
-        try:
-            bridge.run(seconds, until=lambda: stop.requested)
-        except StoppedError as error:
-            ended, failed = str(error), True
-        else:
-            if seconds is not None and uno.cycle >= start_cycle + round(seconds * 16e6):
-                ended = "time is up"
-        edges.finish()
+        ended, failed = _run_to_the_end(uno, bridge, seconds, stop, debugger)
+    insight = uno.insight() if watch.profile is not None else None
+    if watch.profile is not None and insight is not None:
+        write_profile(watch.profile, insight)
     return Emulation(
         cycles=uno.cycle - start_cycle,
         clock_s=clock.now_s() - start_s,
-        rising_edges=edges.rising_edges(),
+        rising_edges=sink.rising_edges(),
         counts=bridge.counts,
         ended=ended,
         program_failed=failed,
         warnings=uno.warnings,
+        insight=insight,
     )
 
 
-class _EdgeSink:
-    """Carries edges from the board to the counts and to the waveform file, so that memory does not grow."""
+def _run_to_the_end(
+    uno: Uno, bridge: Bridge, seconds: float | None, stop: Stop, debugger: GdbServer | None
+) -> tuple[str, bool]:
+    """Run until time is up, somebody stops it or the program ends; returns why, and whether the program failed."""
+    end = None if seconds is None else uno.cycle + round(seconds * CLOCK_HZ)
 
-    def __init__(self, uno: Uno, vcd: VcdWriter | None) -> None:
-        self._uno = uno
-        self._vcd = vcd
-        self._rising = np.zeros(256, dtype=np.int64)
+    def interrupted() -> bool:
+        if debugger is not None:
+            debugger.poll(0.0)
+        return stop.requested or (debugger is not None and debugger.holds)
 
-    def take(self) -> None:
-        edges = self._uno.take_edges()
-        if len(edges) == 0:
-            return
-        self._rising += np.bincount(edges["pin"][edges["level"] == 1], minlength=256)
-        if self._vcd is not None:
-            self._vcd.write(edges, _SIGNAL_OF)
-
-    def finish(self) -> None:
-        self.take()
-        if self._vcd is not None:
-            self._vcd.close(self._uno.cycle)
-
-    def rising_edges(self) -> dict[str, int]:
-        counts = {pin_name(index): count for index, count in enumerate(self._rising.tolist()) if count}
-        return {name: counts[name] for name in TRACED_PINS if name in counts}
-
-
-_SIGNAL_OF = {pin.index: TRACED_PINS.index(pin.name) for pin in PINS if pin.name in TRACED_PINS}
-
-
-def _open_vcd(uno: Uno, path: str | Path) -> VcdWriter:
-    return VcdWriter(path, TRACED_PINS, [uno.pin(name).level for name in TRACED_PINS], uno.cycle)
+    while not stop.requested and (end is None or uno.cycle < end):
+        try:
+            bridge.run(None if end is None else (end - uno.cycle) / CLOCK_HZ, until=interrupted)
+        except StoppedError as error:
+            if debugger is None or not debugger.attached:
+                return str(error), True
+            debugger.board_stopped(StopCause[error.cause])
+        while debugger is not None and debugger.holds and not stop.requested:
+            debugger.poll(DEBUGGER_WAIT_S)
+        bridge.resume()
+    return ("stopped" if stop.requested else "time is up"), False
 
 
 class Stop:

@@ -120,7 +120,7 @@ def _found(firmware: str | Path, request: pytest.FixtureRequest) -> Path:
 
 
 def _keep_what_it_does(board: Uno, artefacts: Artefacts, suffix: str) -> None:
-    from planarm_sim.emulate import TRACED_PINS  # noqa: PLC0415 - see the module's text
+    from planarm_sim.recording import TRACED_PINS  # noqa: PLC0415 - see the module's text
     from planarm_sim.trace import write_serial_log  # noqa: PLC0415
 
     artefacts.add(f"pins{suffix}.vcd", lambda path: board.write_vcd(path, TRACED_PINS))

@@ -1,9 +1,15 @@
 """`emulate` and `python -m planarm_sim`: a program behind a terminal, until it is stopped."""
 
+import csv
+import json
 import os
+import re
 import signal
+import socket
 import subprocess
 import sys
+import threading
+import time
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +20,8 @@ from planarm_sim import Uno
 from planarm_sim.__main__ import main, summary
 from planarm_sim.bridge import BOOT_S
 from planarm_sim.bridge.pty_line import PtyLine
-from planarm_sim.emulate import TRACED_PINS, Stop, emulate, run_board
+from planarm_sim.debug.packets import packet
+from planarm_sim.emulate import TRACED_PINS, Stop, Watch, emulate, run_board
 from planarm_sim.errors import ImageError
 from planarm_sim.trace import read_vcd
 from sim_board.fake_line import FakeClock, FakeLine
@@ -35,7 +42,7 @@ def run(image: str, acts=(), **settings):
 
 
 def test_edges_are_counted_and_carried_to_the_waveform_file(tmp_path):
-    result, uno, _ = run("pulses.hex", vcd=tmp_path / "w.vcd", seconds=0.1)
+    result, uno, _ = run("pulses.hex", watch=Watch(vcd=tmp_path / "w.vcd"), seconds=0.1)
     reference = Uno.from_hex(DATA / "pulses.hex")
     reference.run(cycles=uno.cycle)
     vcd = read_vcd(tmp_path / "w.vcd")
@@ -64,10 +71,79 @@ def test_what_it_did_is_data():
 
 
 def test_a_program_that_ends_ends_the_emulation(tmp_path):
-    result, _, _ = run("echo.hex", [(0.0, "open"), (0.15, b"\x00")], vcd=tmp_path / "w.vcd")
+    result, _, _ = run("echo.hex", [(0.0, "open"), (0.15, b"\x00")], watch=Watch(vcd=tmp_path / "w.vcd"))
     assert result.program_failed
     assert "BREAK" in result.ended
     assert read_vcd(tmp_path / "w.vcd").end_cycle > 0.04 * 16e6
+
+
+def test_profile_and_serial_log_are_written_and_summed_up(tmp_path):
+    watch = Watch(profile=tmp_path / "p.json", serial_log=tmp_path / "s.csv")
+    result, uno, _ = run("echo.hex", [(0.0, "open"), (0.15, b"ab")], watch=watch, seconds=0.1)
+    written = json.loads((tmp_path / "p.json").read_text())
+    assert written == json.loads(json.dumps(result.insight.as_dict()))
+    assert written["cycles"] == uno.cycle
+    assert written["load"] == 1.0
+    told = summary(result).splitlines()
+    assert told[1] == "processor: 100.0% awake, 0.0% in interrupts; deepest stack 0 bytes", "echo.S polls"
+    with (tmp_path / "s.csv").open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    sent = [row["byte"] for row in rows if row["direction"] == "to board"]
+    answered = [row["byte"] for row in rows if row["direction"] == "from board"]
+    assert sent == ["0x61", "0x62"]
+    assert answered == ["0x52", "0x03", "0x62", "0x63"], "R, the causes of reset (power-up, pin), one more than sent"
+    assert all(int(row["end_cycle"]) - int(row["start_cycle"]) == 640 for row in rows)
+    assert len(uno.serial.log) == 0, "carried away, so that memory does not grow"
+
+
+def test_profile_of_a_program_with_interrupts(tmp_path, capsys):
+    image = str(ROOT / "firmware" / "release" / "uno.hex")
+    run_it = [image, "--seconds", "0.05", "--speed", "max", "--profile", str(tmp_path / "p.json")]
+    assert main([*run_it, "--symbols", str(tmp_path / "none.elf")]) == 2
+    out, err = capsys.readouterr()
+    assert out == "", "nothing was started"
+    assert "none.elf: cannot be read" in err
+    assert main(run_it) == 0
+    assert "deepest stack" in capsys.readouterr().out
+
+
+def test_a_debugger_attaches_to_a_running_board(tmp_path):
+    said: list[str] = []
+    stop, clock = Stop(), FakeClock()
+    uno = Uno.from_hex(DATA / "pulses.hex")
+    shown: list[bytes] = []
+
+    class Conversation(FakeLine):
+        """Attaches when the board has run a while, looks, lets it go on, and asks for the end."""
+
+        peer: socket.socket | None = None
+
+        def is_open(self):
+            if self.clock.time_s > 0.02 and self.peer is None:
+                port = int(said[0].rsplit(":", 1)[1])
+                self.peer = socket.create_connection(("127.0.0.1", port), timeout=LONG_S)
+                self.peer.sendall(packet(b"p22"))
+            if self.clock.time_s > 0.04:
+                stop()
+            return super().is_open()
+
+    line = Conversation(clock, [])
+
+    def talk():
+        while line.peer is None:
+            time.sleep(0.001)
+        shown.append(line.peer.recv(100))
+        line.peer.sendall(packet(b"c"))
+
+    debugger = threading.Thread(target=talk)
+    debugger.start()
+    result = run_board(uno, line, clock, stop, watch=Watch(gdb_port=0), say=said.append)
+    debugger.join(LONG_S)
+    line.peer.close()
+    assert said[0].startswith("avr-gdb attaches by: target remote localhost:")
+    assert re.fullmatch(rb"\+\$[0-9a-f]{8}#[0-9a-f]{2}", shown[0])
+    assert result.ended == "stopped"
+    assert uno.time_s > 0.03
 
 
 def test_warnings_come_along():

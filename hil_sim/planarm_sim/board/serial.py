@@ -159,8 +159,12 @@ class SerialPort:
         return self._log.recorded()
 
     def clear_log(self) -> None:
-        """Forget the frames recorded so far; for runs without end."""
+        """Forget the frames recorded so far."""
         self._log = SerialLog()
+
+    def take_log(self) -> NDArray[Any]:
+        """Return the frames that are over as `log` does, and forget them; for runs without end."""
+        return self._log.take(self._chip.cycle)
 
     def _line_free_cycle(self) -> int:
         """First cycle after the last byte written; exact, so that no rounding adds up over a burst."""

@@ -14,6 +14,8 @@ FROM_BOARD: Final = 1
 FRAME: Final = np.dtype([("start", np.int64), ("end", np.int64), ("direction", np.uint8), ("byte", np.uint16)])
 """One frame: when its start bit begins, when its stop bit ends, which way it goes, and what it carries."""
 
+_NOTHING = np.empty(0, FRAME)
+
 SerialLogState: TypeAlias = tuple[NDArray[Any], ...]
 
 
@@ -36,8 +38,17 @@ class SerialLog:
 
     def recorded(self) -> NDArray[Any]:
         """All of them, FRAME in order of their ends."""
-        joined = np.concatenate([np.empty(0, FRAME), *self.snapshot()])
+        joined = np.concatenate([_NOTHING, *self.snapshot()])
         return joined[np.argsort(joined["end"], kind="stable")]
+
+    def take(self, cycle: int) -> NDArray[Any]:
+        """Return those that have ended by `cycle`, and keep the others."""
+        if not self._pieces and not self._single:
+            return _NOTHING
+        recorded = self.recorded()
+        over = recorded["end"] <= cycle
+        self._pieces, self._single = ([recorded[~over]] if not over.all() else []), []
+        return recorded[over]
 
     def snapshot(self) -> SerialLogState:
         """What `restore` takes; the arrays are never changed."""

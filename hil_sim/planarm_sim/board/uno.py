@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from planarm_sim.board.pins import PINS, PinPlace, pin_place
 from planarm_sim.board.serial import CLOCK_HZ, FRAME_BITS, SerialPort, SerialState
 from planarm_sim.cpu.chip import EDGE_DTYPE, Chip, ResetCause, Snapshot, StopCause
+from planarm_sim.debug import GdbServer, Target, serve
 from planarm_sim.errors import LimitError, PinError, StoppedError, UsageError
 from planarm_sim.insight import Insight, Observer
 from planarm_sim.loader import Image, join_bootloader, load_elf, load_hex, load_image
@@ -335,6 +336,33 @@ class Uno:
             UsageError: the program is not watched.
         """
         return self._watching().intervals()
+
+    def debug_target(self) -> Target:
+        """The board as a debugger sees it; see `planarm_sim.debug`."""
+        return Target(self._chip, self._observer)
+
+    def serve_gdb(self, port: int = 0, *, announce: Callable[[int], None] = lambda _port: None) -> None:
+        """Have avr-gdb run this board (`target remote localhost:PORT`), and come back when it has gone.
+
+        Time passes as the debugger says, as fast as it can be computed; the board stands still until it attaches.
+
+        Args:
+            port: TCP port, of this computer only; 0 takes a free one.
+            announce: takes the port as soon as a debugger can attach.
+
+        Raises:
+            BridgeError: the port cannot be had.
+        """
+
+        def run_slice(cycles: int) -> StopCause:
+            cause = self._chip.run_to(self._chip.cycle + cycles)
+            self._collect()
+            return cause
+
+        with GdbServer(port, self.debug_target) as server:
+            announce(server.port)
+            serve(server, run_slice)
+        self._collect()
 
     def _watching(self) -> Observer:
         if self._observer is None:

@@ -137,6 +137,10 @@ class Bridge:
         self._from_line()
         self._sleep()
 
+    def resume(self) -> None:
+        """Go on after a while in which the board stood still and the clock did not: nothing is to be made up."""
+        self._anchor_s, self._anchor_cycle = self._clock.now_s(), self._uno.cycle
+
     def _notice_open(self) -> None:
         if self._line.opened():
             self._opened += 1
@@ -160,7 +164,7 @@ class Bridge:
             self._line.wait(min(boots_at_s - now_s, QUIET_SLICE_S), for_bytes=False)
         else:
             self._boots_at_s = None
-            self._anchor_s, self._anchor_cycle = now_s, self._uno.cycle
+            self.resume()
 
     def _target_cycle(self) -> int:
         uno = self._uno

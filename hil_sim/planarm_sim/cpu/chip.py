@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from planarm_sim.cpu import layout as at
 from planarm_sim.cpu import queues, service
 from planarm_sim.cpu import registers as reg
+from planarm_sim.cpu.bus import read_data_space, write_data_space
 from planarm_sim.cpu.decode import FLASH_BYTES
 from planarm_sim.cpu.dispatch import run
 from planarm_sim.cpu.interrupts import note_raised
@@ -443,6 +444,21 @@ class Chip:
     def flash(self) -> NDArray[np.uint8]:
         """The program memory; not to be written to."""
         return self._program.flash
+
+    def peek_data(self, addresses: range) -> bytes:
+        """What the program would read at data addresses now, without what reading does to I/O registers."""
+        st = self._state.copy()
+        return bytes(read_data_space(st, self._memory, address) for address in addresses)
+
+    def poke_data(self, address: int, data: bytes) -> None:
+        """Write to the data space as the program does, with all that writing does, now."""
+        for place, byte in enumerate(data, start=address):
+            write_data_space(self._state, self._memory, place, byte)
+
+    def poke_flash(self, address: int, data: bytes) -> None:
+        """Replace bytes of the flash, as a programmer does."""
+        self._program = self._program.with_bytes(address, data)
+        self._look_at_flash()
 
     def _check_pin(self, pin: int) -> None:
         if not 0 <= pin < PINS:

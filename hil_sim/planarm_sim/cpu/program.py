@@ -45,6 +45,12 @@ class Program:
         first = word - word % PAGE_WORDS
         return self._with_page(word, self.flash.view("<u2")[first : first + PAGE_WORDS] & page)
 
+    def with_bytes(self, address: int, data: bytes) -> Program:
+        """The same with bytes replaced from `address` on, as a programmer or a debugger does it."""
+        flash = self.flash.copy()
+        flash[address : address + len(data)] = np.frombuffer(data, dtype=np.uint8)
+        return Program.of(flash, erased_runs=self.erased_runs)
+
     def rww_blocked(self) -> Program:
         """The same as the CPU sees it while the RWW section cannot be read: bytes read as erased, no opcode runs."""
         flash, code = self.flash.copy(), self.code.copy()

@@ -19,9 +19,11 @@ from planarm_sim.cpu.layout import (
     PC,
     RAISED_AT,
     SP,
+    SREG_BITS,
     Bytes,
     State,
 )
+from planarm_sim.cpu.registers import SPL, SRAM_START, SREG
 from planarm_sim.cpu.service import AT_BAD_OPCODE, REACHED, TRAPPED
 
 # What a word is, bits of its role.
@@ -40,8 +42,10 @@ LOG_FULL = 200
     DEEPEST_SP,
     LOGGED,
     LOST_FRAMES,  # that the stack of frames had no room for
+    PASSED_AT,  # cycle at which a breakpoint does not stop: the debugger goes on from there
+    CHANGED,  # data address whose watched value changed, or -1
     TOTALS,
-) = range(9)
+) = range(11)
 
 # --- Fields of a frame: what runs on the stack from `FRAME_SP` down ---
 (
@@ -114,7 +118,7 @@ def run_watched(
         role = int(roles[st[PC]]) if cause == AT_BAD_OPCODE else 0
         if role == 0:
             return cause
-        if role & BREAKPOINT:
+        if role & BREAKPOINT and st[CYCLE] != totals[PASSED_AT]:
             return TRAPPED
         arrive(st, role, totals, frames, functions, vectors, log)
         cause = run(st, memory, words, code, flash, int(st[CYCLE]) + 1)
@@ -123,6 +127,66 @@ def run_watched(
             return cause
         if (totals[LOGGED] + LOG_MARGIN) * INTERVAL_WORDS > len(log):
             return LOG_FULL
+
+
+@kernel
+def run_to_change(
+    st: State,
+    memory: Bytes,
+    words: State,
+    code: State,
+    landmarks: State,
+    flash: Bytes,
+    roles: State,
+    totals: State,
+    frames: State,
+    functions: State,
+    vectors: State,
+    log: State,
+    places: State,
+    values: State,
+    target: int,
+) -> int:
+    """Run as `run_watched` does, an instruction at a time, until one of the data addresses `places` changes."""
+    while True:
+        cause = run_watched(
+            st,
+            memory,
+            words,
+            code,
+            landmarks,
+            flash,
+            roles,
+            totals,
+            frames,
+            functions,
+            vectors,
+            log,
+            min(int(st[CYCLE]) + 1, target),
+        )
+        for index in range(len(places)):
+            value = data_byte(st, memory, int(places[index]))
+            if value != values[index]:
+                values[index] = value
+                totals[CHANGED] = places[index]
+        if cause != REACHED:
+            return cause
+        if totals[CHANGED] >= 0:
+            return TRAPPED
+        if st[CYCLE] >= target:
+            return REACHED
+
+
+@kernel
+def data_byte(st: State, memory: Bytes, address: int) -> int:
+    """A byte of the data space; an I/O register as it was last written."""
+    if address >= SRAM_START:
+        return int(memory[address - SRAM_START])
+    if address == SREG:
+        return int(st[SREG_BITS])
+    if address in (SPL, SPL + 1):
+        return int(st[SP] >> (8 * (address - SPL)) & 0xFF)
+    return int(st[address])
 
 
 @kernel

@@ -38,9 +38,6 @@ class Observer:
         symbols: the program's functions.
         figures: keep figures; without, only breakpoints are seen to.
         keep_intervals: keep every interrupt's interval, too.
-
-    Attributes:
-        breakpoints: word addresses at which the chip stops before the instruction.
     """
 
     def __init__(self, symbols: Iterable[Symbol] = (), *, figures: bool = True, keep_intervals: bool = True) -> None:
@@ -48,6 +45,7 @@ class Observer:
         self._figures = figures
         self._keep_intervals = keep_intervals
         self._breakpoints: frozenset[int] = frozenset()
+        self._places = self._values = np.empty(0, dtype=np.int64)
         self._program: Program | None = None
         self._roles = self._landmarks = np.empty(0, dtype=np.int64)
         self._log = np.zeros(LOG_INTERVALS * k.INTERVAL_WORDS, dtype=np.int64)
@@ -65,6 +63,7 @@ class Observer:
         figures[:, [k.ACKNOWLEDGED_AT, k.LEFT_AT]] = cycle
         self._totals = np.zeros(k.TOTALS, dtype=np.int64)
         self._totals[k.DEEPEST_SP] = SRAM_END - 1
+        self._totals[[k.PASSED_AT, k.CHANGED]] = -1
         self._frames = np.zeros(k.FRAMES * k.FRAME_WORDS, dtype=np.int64)
         self.restart(cycle)
 
@@ -86,14 +85,40 @@ class Observer:
         self._breakpoints = frozenset(words)
         self._program = None
 
+    @property
+    def watchpoints(self) -> frozenset[int]:
+        """Data addresses at whose change the chip stops, after the instruction that made it."""
+        return frozenset(self._places.tolist())
+
+    @watchpoints.setter
+    def watchpoints(self, addresses: Iterable[int]) -> None:
+        self._places = np.array(sorted(addresses), dtype=np.int64)
+        self._values = np.full(len(self._places), -1, dtype=np.int64)
+
+    @property
+    def changed_address(self) -> int | None:
+        """The watched data address whose change stopped the chip; None when something else did."""
+        changed = int(self._totals[k.CHANGED])
+        return changed if changed >= 0 else None
+
+    def pass_breakpoint(self, cycle: int) -> None:
+        """Do not stop at a breakpoint at this cycle, nor for changes made before: a debugger goes on."""
+        self._totals[k.PASSED_AT] = cycle
+        self._values[:] = -1
+
     def advance(self, st: State, memory: Bytes, words: State, program: Program, target: int) -> int:
         """Run as `dispatch.run` does and note what is met; returns one of `service`'s stops."""
         if program is not self._program:
             self._look_at(program)
+        chip = (st, memory, words, program.code, self._landmarks, program.flash, self._roles)
+        self._totals[k.CHANGED] = -1
+        for index in np.nonzero(self._values < 0)[0]:
+            self._values[index] = k.data_byte(st, memory, int(self._places[index]))
         while True:
-            cause = k.run_watched(
-                st, memory, words, program.code, self._landmarks, program.flash, self._roles, *self._arrays(), target
-            )
+            if len(self._places):
+                cause = k.run_to_change(*chip, *self._arrays(), self._places, self._values, target)
+            else:
+                cause = k.run_watched(*chip, *self._arrays(), target)
             self._take_log()
             if cause != k.LOG_FULL:
                 return int(cause)

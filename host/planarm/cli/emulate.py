@@ -15,7 +15,7 @@ from planarm.link.released_image import released_image
 def execute(options: argparse.Namespace) -> int:
     """Emulate until stopped; the pty's path is printed first, on stderr when --json keeps stdout for the result."""
     tell_first_compile("planarm_sim")
-    from planarm_sim.__main__ import summary
+    from planarm_sim.__main__ import summary, watch_of
     from planarm_sim.emulate import emulate
     from planarm_sim.errors import SimError
 
@@ -25,7 +25,7 @@ def execute(options: argparse.Namespace) -> int:
             options.firmware or released_image(),
             bootloader=options.bootloader,
             link=options.link,
-            vcd=options.vcd,
+            watch=watch_of(options),
             speed=options.speed,
             announce=lambda path: print(path, file=talk, flush=True),
             say=lambda text: print(f"note: {text}", file=sys.stderr, flush=True),

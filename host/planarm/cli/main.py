@@ -139,7 +139,13 @@ def _add_emulate(commands: Commands) -> None:
     command.add_argument("--firmware", metavar="HEX|ELF", help="the image to run (default: the released firmware)")
     command.add_argument("--bootloader", metavar="HEX|ELF", help="a boot loader, so that avrdude can upload")
     command.add_argument("--link", metavar="PATH", help="make PATH a link to the pty")
-    command.add_argument("--vcd", metavar="FILE", help="write the pins' edges to FILE at the end")
+    command.add_argument("--vcd", metavar="FILE", help="write the pins' waveforms")
+    command.add_argument("--serial-log", metavar="FILE", help="write every byte on the serial line and its cycles")
+    command.add_argument(
+        "--profile", metavar="FILE", help="write interrupts, load, stack and cycles per function (JSON); runs slower"
+    )
+    command.add_argument("--symbols", metavar="ELF", help="where --profile finds the functions of an Intel HEX image")
+    command.add_argument("--gdb", type=int, metavar="PORT", help="let avr-gdb attach: target remote localhost:PORT")
     command.add_argument("--speed", choices=("real", "max"), default="real", help="pace of the chip's clock")
     _add_json(command)
 
