@@ -14,11 +14,30 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from planarm_sim.errors import SimError
+from planarm_sim.plant import CircleObstacle, Joint, LimitSwitch, Link, Motor, PolygonObstacle, Rig
 
 if TYPE_CHECKING:
-    from planarm_sim.board import Pin, Uno, UnoSnapshot
+    from planarm_sim.bench import Bench, BenchReport
+from planarm_sim.board import Pin, Uno, UnoSnapshot
+from planarm_sim.drivers import DriverWiring, driver_row
 
-__all__ = ["Pin", "SimError", "Uno", "UnoSnapshot"]
+__all__ = [
+    "Bench",
+    "BenchReport",
+    "CircleObstacle",
+    "DriverWiring",
+    "Joint",
+    "LimitSwitch",
+    "Link",
+    "Motor",
+    "Pin",
+    "PolygonObstacle",
+    "Rig",
+    "SimError",
+    "Uno",
+    "UnoSnapshot",
+    "driver_row",
+]
 
 
 def __getattr__(name: str) -> object:

@@ -123,6 +123,7 @@ class Uno:
         self._observer: Observer | None = None
         self.serial = SerialPort(self._chip, baud)
         self._edges: list[NDArray[Any]] = []
+        self._listeners: list[Callable[[NDArray[Any]], None]] = []
         self._log_start_cycle = 0
         self._log_start_levels = self._levels()
 
@@ -288,6 +289,10 @@ class Uno:
         self.clear_edges()
         return taken
 
+    def listen(self, listener: Callable[[NDArray[Any]], None]) -> None:
+        """Hand every further edge, after each run, to a function as well; see `take_edges` for their form."""
+        self._listeners.append(listener)
+
     def write_vcd(self, path: str | Path, names: Sequence[str]) -> None:
         """Write the recorded level changes of some pins as a waveform file.
 
@@ -404,6 +409,8 @@ class Uno:
         edges = self._chip.drain_edges()
         if len(edges):
             self._edges.append(edges)
+            for listener in self._listeners:
+                listener(edges)
 
     def _recorded(self) -> NDArray[Any]:
         """All recorded edges in one array; joined once, then kept so."""

@@ -1,0 +1,184 @@
+"""The bench: an emulated Uno, its drivers, motors and arm, in one time.
+
+::
+
+    from planarm_sim import Bench, Rig
+
+    bench = Bench(uno, rig, drivers)
+    bench.run(seconds=1)
+    print(bench.q_rad, bench.report())
+
+The board runs ahead by a slice; then its edges go through the drivers, and the arm follows. What the arm does to the
+board, limit switches, happens as the next slice begins. Two runs with the same calls are the same to the last edge.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from planarm_sim.board import CLOCK_HZ, PINS, Uno
+from planarm_sim.drivers import DriverBank, DriverCounts, DriverWiring, Violation
+from planarm_sim.errors import UsageError
+from planarm_sim.plant import Contact, Plant, Rig, Slip, StopHit
+
+__all__ = ["Bench", "BenchReport"]
+
+SLICE_CYCLES = 16_000
+"""How far the board runs ahead of the arm, 1 ms; with limit switches a tenth of that."""
+EMPTY = np.empty(0, [("cycle", np.int64), ("pin", np.uint8), ("level", np.uint8)])
+
+
+@dataclass(frozen=True, slots=True)
+class BenchReport:
+    """What happened on the bench so far; times are clock cycles since power-up.
+
+    Attributes:
+        cycle: now.
+        counts: what each driver saw and did.
+        lost_full_steps: how many full steps each rotor stands behind what its driver's pulses asked for, rounded; a
+            load angle is not lost.
+        slips: every electrical turn that a rotor lost.
+        violations: every broken rule of a driver.
+        contacts: every touch of a link and an obstacle.
+        stop_hits: every time that a joint ran into a hard stop.
+    """
+
+    cycle: int
+    counts: tuple[DriverCounts, ...]
+    lost_full_steps: tuple[int, ...]
+    slips: tuple[Slip, ...]
+    violations: tuple[Violation, ...]
+    contacts: tuple[Contact, ...]
+    stop_hits: tuple[StopHit, ...]
+
+    @property
+    def clean(self) -> bool:
+        """Whether nothing went wrong: no step lost, no rule broken, nothing hit."""
+        return not (any(self.lost_full_steps) or self.slips or self.violations or self.contacts or self.stop_hits)
+
+
+class Bench:
+    """An Uno with drivers, motors and an arm.
+
+    Args:
+        uno: the board; from now on let time pass by the bench only.
+        rig: the arm with its motors.
+        drivers: one for each motor.
+        step_cycles: the plant's step, see `Plant`.
+
+    Attributes:
+        uno: the board.
+        plant: the arm.
+        drivers: the drivers.
+    """
+
+    def __init__(self, uno: Uno, rig: Rig, drivers: Sequence[DriverWiring], *, step_cycles: int | None = None) -> None:
+        if len(drivers) != len(rig.motors):
+            raise UsageError(
+                f"the rig has {len(rig.motors)} motors, {len(drivers)} drivers are given; give one for each"
+            )
+        self.uno = uno
+        self.plant = Plant(rig, uno.cycle, step_cycles=step_cycles)
+        levels = [0] * (1 + max(pin.index for pin in PINS))
+        for pin in PINS:
+            levels[pin.index] = uno.pin(pin.name).level
+        self.drivers = DriverBank(drivers, levels, self.plant.start_phases)
+        self._slice_cycles = SLICE_CYCLES // 10 if rig.switches else SLICE_CYCLES
+        self._fresh: list[NDArray[Any]] = []
+        self._seen_cycle = uno.cycle
+        self._agenda: list[tuple[int, int, Callable[[], None]]] = []
+        states = self.drivers.states
+        self.plant.take(np.array([[uno.cycle, m, phase, on] for m, (phase, on) in enumerate(states.tolist())]))
+        uno.listen(self._hear)
+
+    @property
+    def cycle(self) -> int:
+        """Clock cycles since power-up."""
+        return self.uno.cycle
+
+    @property
+    def time_s(self) -> float:
+        """Seconds since power-up."""
+        return self.uno.time_s
+
+    @property
+    def q_rad(self) -> NDArray[np.float64]:
+        """Joint angles now."""
+        self.catch_up()
+        return self.plant.q_rad
+
+    def run(self, *, cycles: int | None = None, seconds: float | None = None) -> None:
+        """Let time pass for board, drivers and arm, by a number of cycles or of seconds.
+
+        Raises:
+            UsageError: not exactly one of the two, or negative.
+            StoppedError: the program came to an end before.
+        """
+        if (cycles is None) == (seconds is None):
+            raise UsageError("run takes either cycles or seconds")
+        end = self.uno.cycle + (round(seconds * CLOCK_HZ) if seconds is not None else int(cycles or 0))
+        if end < self.uno.cycle:
+            raise UsageError(f"run was asked for {end - self.uno.cycle} cycles; time runs forward only")
+        while self.uno.cycle < end:
+            self._do_what_is_due()
+            target = min(end, self._seen_cycle + self._slice_cycles, self._next_due())
+            if target > self.uno.cycle:
+                self.uno.run(cycles=target - self.uno.cycle)
+            if self.uno.cycle >= self._seen_cycle + self._slice_cycles:
+                self.catch_up()
+
+    def at(self, cycle: int, action: Callable[[], None]) -> None:
+        """Do something to the bench when its time comes; actions of one cycle happen in the order of these calls."""
+        self._agenda.append((cycle, len(self._agenda), action))
+        self._agenda.sort(key=lambda entry: entry[:2])
+
+    def catch_up(self) -> None:
+        """Let drivers and arm see everything up to the board's time."""
+        now = self.uno.cycle
+        edges = np.concatenate([EMPTY, *self._fresh]) if self._fresh else EMPTY
+        self._fresh = []
+        self.plant.take(self.drivers.see(edges, now))
+        self.plant.run_to(now)
+        self._seen_cycle = now
+
+    def set_motor_supply(self, on: bool) -> None:
+        """Switch the supply of all motors; the board on USB goes on."""
+        self.catch_up()
+        for m in range(len(self.drivers.wirings)):
+            self.plant.take(self.drivers.set_power(m, on, self.uno.cycle))
+
+    def report(self) -> BenchReport:
+        """What happened so far."""
+        self.catch_up()
+        lost = self.plant.lost_full_steps(self.drivers.wanted_phases)
+        return BenchReport(
+            cycle=self.uno.cycle,
+            counts=self.drivers.counts(),
+            lost_full_steps=tuple(round(steps) for steps in lost),
+            slips=self.plant.slips(),
+            violations=self.drivers.violations(),
+            contacts=self.plant.contacts(),
+            stop_hits=self.plant.stop_hits(),
+        )
+
+    def motion(self) -> NDArray[Any]:
+        """Samples of the motion so far, see `Plant.motion`."""
+        self.catch_up()
+        return self.plant.motion()
+
+    def _hear(self, edges: NDArray[Any]) -> None:
+        self._fresh.append(edges)
+
+    def _do_what_is_due(self) -> None:
+        while self._agenda and self._agenda[0][0] <= self.uno.cycle:
+            _, _, action = self._agenda.pop(0)
+            self.catch_up()
+            action()
+
+    def _next_due(self) -> int:
+        return self._agenda[0][0] if self._agenda else 1 << 62

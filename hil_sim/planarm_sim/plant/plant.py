@@ -1,0 +1,400 @@
+"""The arm as an object: it takes what the drivers ask for and lets time pass."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from planarm_sim.errors import UsageError
+from planarm_sim.plant import layout, simulate
+from planarm_sim.plant.contact import obstacle_arrays
+from planarm_sim.plant.rigid_body import energy_j, inertia_constants
+from planarm_sim.plant.spec import Rig
+
+__all__ = ["Contact", "Plant", "Slip", "StopHit", "SwitchChange"]
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+CYCLES_PER_S = 16_000_000
+LONGEST_STEP_CYCLES = 800
+"""50 us, a chopper's period: a thirtieth of an electrical turn at 2,500 full steps a second."""
+STABLE_SHARE = 0.25
+"""Longest step as a share of the fastest vibration's 1 / omega."""
+SAMPLE_CYCLES = 8000
+"""Time between samples of the motion, 0.5 ms."""
+CHUNK_STEPS = 4000
+MOST_MARKS = 4096
+NO_EVENTS = np.empty((0, 4), np.int64)
+PHASE_PER_STEP = 256
+
+
+@dataclass(frozen=True, slots=True)
+class Slip:
+    """A rotor lost its step: it stays a whole electrical turn behind its driver, or gets one ahead.
+
+    Attributes:
+        cycle: clock cycle.
+        motor: number from 0.
+        full_steps: 4 when it fell behind in the positive sense, -4 in the negative.
+        speed_rad_s: of the rotor then.
+    """
+
+    cycle: int
+    motor: int
+    full_steps: int
+    speed_rad_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class Contact:
+    """A link touched an obstacle.
+
+    Attributes:
+        cycle: clock cycle of the first touch.
+        link: number from 0.
+        obstacle: number from 0.
+        place: where on the link, as a share of its length.
+    """
+
+    cycle: int
+    link: int
+    obstacle: int
+    place: float
+
+
+@dataclass(frozen=True, slots=True)
+class StopHit:
+    """A joint ran into its hard stop, at an angle."""
+
+    cycle: int
+    joint: int
+    q_rad: float
+
+
+@dataclass(frozen=True, slots=True)
+class SwitchChange:
+    """A limit switch was pressed or let go of."""
+
+    cycle: int
+    switch: int
+    pressed: bool
+
+
+class Plant:
+    """An arm with its motors, from a cycle on.
+
+    Args:
+        rig: what stands there; it is at rest at the rig's start.
+        cycle: clock cycle of 62.5 ns at which it begins.
+        step_cycles: length of a step; None chooses one at which the fastest vibration is computed well.
+        sample_cycles: time between samples of `motion`; 0 keeps none.
+    """
+
+    def __init__(
+        self, rig: Rig, cycle: int = 0, *, step_cycles: int | None = None, sample_cycles: int = SAMPLE_CYCLES
+    ) -> None:
+        self.rig = rig
+        self._step_cycles = step_cycles or _fitting_step(rig)
+        self._begin = cycle
+        self._cycle = cycle
+        self._sample_cycles = sample_cycles
+        n = len(rig.links)
+        self._body = _body(rig)
+        self._drive = _drive(rig)
+        self._obstacles = obstacle_arrays(rig.obstacles)
+        self._state = _start(rig, self._drive)
+        self._switches = _switches(rig)
+        size = len(self._state.y)
+        self._work = layout.Work(np.zeros((4, size)), np.zeros(size), *(np.zeros(s) for s in ((n, n), n, n, (n, n), n)))
+        self._marks: list[Floats] = []
+        self._log = [np.concatenate([[cycle], self._state.y])[None]]
+        self._waiting = NO_EVENTS
+
+    @property
+    def cycle(self) -> int:
+        """Time up to which it was computed; less than a step before what was asked for."""
+        return self._cycle
+
+    @property
+    def step_cycles(self) -> int:
+        """Length of a step in cycles."""
+        return self._step_cycles
+
+    @property
+    def start_phases(self) -> tuple[int, ...]:
+        """Phases at which drivers hold the rotors where they start, in 1/256 of a full step."""
+        turns = self._rotors_at(np.array(self.rig.start_rad)) / (2.0 * np.pi)
+        steps = np.array([motor.steps_per_rev for motor in self.rig.motors])
+        return tuple(int(p) for p in np.rint(turns * steps * PHASE_PER_STEP))
+
+    @property
+    def q_rad(self) -> Floats:
+        """Joint angles now."""
+        n = len(self.rig.links)
+        return np.diff(self._state.y[:n], prepend=0.0)
+
+    @property
+    def q_dot_rad_s(self) -> Floats:
+        """Joint speeds now."""
+        n = len(self.rig.links)
+        return np.diff(self._state.y[n : 2 * n], prepend=0.0)
+
+    @property
+    def rotors_rad(self) -> Floats:
+        """Rotor angles now, from where micro-step 0 is."""
+        n = len(self.rig.links)
+        return self._state.y[2 * n : 2 * n + len(self.rig.motors)].copy()
+
+    @property
+    def currents_a(self) -> Floats:
+        """Phase currents now, shape (motors, 2)."""
+        return self._state.currents.copy()
+
+    @property
+    def energy_j(self) -> float:
+        """Kinetic and potential energy of links, rotors and gears now."""
+        n, m = len(self.rig.links), len(self.rig.motors)
+        y, drive = self._state.y, self._drive
+        total = float(energy_j(self._body.a, self._body.b, self._body.gravity, y[:n], y[n : 2 * n]))
+        slack = drive.coupling @ (self.q_rad - drive.zero) - drive.gear * y[2 * n : 2 * n + m]
+        beyond = np.maximum(np.abs(slack) - drive.half_play, 0.0)
+        return total + float(
+            (0.5 * drive.stiffness * beyond**2).sum() + (0.5 * drive.inertia * y[2 * n + m :] ** 2).sum()
+        )
+
+    def set_motion(self, q_rad: Sequence[float], q_dot_rad_s: Sequence[float]) -> None:
+        """Put the joints somewhere, moving; the rotors follow without strain."""
+        n, m = len(self.rig.links), len(self.rig.motors)
+        y = self._state.y
+        y[:n], y[n : 2 * n] = np.cumsum(q_rad), np.cumsum(q_dot_rad_s)
+        y[2 * n : 2 * n + m] = self._rotors_at(np.asarray(q_rad))
+        y[2 * n + m :] = (self._drive.coupling @ np.asarray(q_dot_rad_s)) / self._drive.gear
+
+    def set_friction(self, joint: int, coulomb_nm: float) -> None:
+        """Change a joint's dry friction from now on."""
+        self._state.coulomb[joint] = coulomb_nm
+
+    def set_rotor_friction(self, motor: int, coulomb_nm: float) -> None:
+        """Change a rotor's dry friction from now on; far beyond its torque it is jammed."""
+        self._state.rotor_coulomb[motor] = coulomb_nm
+
+    def set_outside_torque(self, joint: int, torque_nm: float) -> None:
+        """Push on a joint from outside, from now on."""
+        self._state.outside[joint] = torque_nm
+
+    def set_supply(self, motor: int, volts: float) -> None:
+        """Change what a driver can put on its motor's phases, from now on."""
+        self._state.supply[motor] = volts
+
+    def take(self, events: Ints) -> None:
+        """Take what the drivers ask for: cycle, motor, phase, on; it counts when its time comes."""
+        if len(events):
+            waiting = np.concatenate([self._waiting, events])
+            self._waiting = waiting[np.argsort(waiting[:, 0], kind="stable")]
+
+    def run_to(self, cycle: int) -> None:
+        """Let time pass up to `cycle`, in whole steps.
+
+        Raises:
+            UsageError: the state is no number any more; the step is too long for what was set.
+        """
+        steps = (cycle - self._cycle) // self._step_cycles
+        while steps > 0:
+            chunk = min(steps, CHUNK_STEPS)
+            self._run(chunk)
+            steps -= chunk
+        if not np.isfinite(self._state.y).all():
+            raise UsageError(
+                f"the arm's motion is no number any more before {self._cycle / CYCLES_PER_S:.6f} s; give the plant a "
+                f"step_cycles below {self._step_cycles}"
+            )
+
+    def _run(self, steps: int) -> None:
+        every = self._sample_cycles or (1 << 60)
+        end = self._cycle + steps * self._step_cycles
+        log = np.empty((end // every - self._cycle // every + 1, 1 + len(self._state.y)))
+        marks = np.empty((MOST_MARKS, layout.MARK_COLUMNS))
+        due = int(np.searchsorted(self._waiting[:, 0], end, side="left"))
+        logged, marked = simulate.advance(
+            self._body,
+            self._drive,
+            self._obstacles,
+            self._switches,
+            self._state,
+            self._work,
+            self._cycle,
+            steps,
+            self._step_cycles,
+            self._waiting[:due],
+            log,
+            every,
+            marks,
+        )
+        # The middle of the last step has not passed for what came in its second half.
+        done = int(np.searchsorted(self._waiting[:, 0], end - self._step_cycles + self._step_cycles // 2, side="right"))
+        self._waiting = self._waiting[done:]
+        self._cycle = end
+        if logged:
+            self._log.append(log[:logged].copy())
+        if marked:
+            self._marks.append(marks[:marked].copy())
+
+    def motion(self) -> NDArray[Any]:
+        """Samples of the motion so far.
+
+        Returns:
+            Structured array: cycle (int64), q_rad (joints), q_dot_rad_s (joints), rotor_rad (motors).
+        """
+        rows = np.concatenate(self._log)
+        self._log = [rows]
+        n, m = len(self.rig.links), len(self.rig.motors)
+        dtype = [("cycle", np.int64), ("q_rad", float, (n,)), ("q_dot_rad_s", float, (n,)), ("rotor_rad", float, (m,))]
+        result = np.empty(len(rows), dtype)
+        result["cycle"] = rows[:, 0]
+        result["q_rad"] = np.diff(rows[:, 1 : n + 1], prepend=0.0, axis=1)
+        result["q_dot_rad_s"] = np.diff(rows[:, n + 1 : 2 * n + 1], prepend=0.0, axis=1)
+        result["rotor_rad"] = rows[:, 2 * n + 1 : 2 * n + m + 1]
+        return result
+
+    def slips(self) -> tuple[Slip, ...]:
+        """Every electrical turn that a rotor lost, in order of time."""
+        rows = self._marked(layout.SLIPPED)
+        return tuple(Slip(int(c), int(m), 4 * int(turns), speed) for c, _, m, turns, speed in rows)
+
+    def contacts(self) -> tuple[Contact, ...]:
+        """Every touch of a link and an obstacle, in order of time."""
+        rows = self._marked(layout.TOUCHED)
+        return tuple(Contact(int(c), int(i), int(k), place) for c, _, i, k, place in rows)
+
+    def stop_hits(self) -> tuple[StopHit, ...]:
+        """Every time that a joint ran into a hard stop."""
+        return tuple(StopHit(int(c), int(i), q) for c, _, i, _, q in self._marked(layout.STOPPED))
+
+    def switch_changes(self) -> tuple[SwitchChange, ...]:
+        """Every change of a limit switch, without its bouncing."""
+        rows = self._marked(layout.SWITCHED)
+        return tuple(SwitchChange(int(c), int(k), bool(pressed)) for c, _, k, pressed, _ in rows)
+
+    @property
+    def pressed(self) -> tuple[bool, ...]:
+        """Whether each limit switch is pressed now."""
+        return tuple(bool(p) for p in self._switches.pressed)
+
+    def lost_full_steps(self, counted_phases: Ints) -> tuple[float, ...]:
+        """How far each rotor is behind what its driver counted since the start, in full steps, load angle included."""
+        moved = self.rotors_rad - self._rotors_at(np.array(self.rig.start_rad))
+        steps = np.array([motor.steps_per_rev for motor in self.rig.motors]) / (2.0 * np.pi)
+        return tuple((counted_phases / PHASE_PER_STEP - moved * steps).tolist())
+
+    def snapshot(self) -> tuple[Any, ...]:
+        """Copy what decides the further run, and what was seen so far."""
+        arrays = [array.copy() for array in (*self._state, self._switches.pressed)]
+        return self._cycle, arrays, list(self._log), list(self._marks), self._waiting
+
+    def restore(self, snapshot: tuple[Any, ...]) -> None:
+        """Go back to a snapshot."""
+        self._cycle, arrays, log, marks, self._waiting = snapshot
+        for array, saved in zip((*self._state, self._switches.pressed), arrays, strict=True):
+            array[...] = saved
+        self._log, self._marks = list(log), list(marks)
+
+    def _marked(self, kind: int) -> list[list[float]]:
+        rows = np.concatenate([np.empty((0, layout.MARK_COLUMNS)), *self._marks])
+        return [list(row) for row in rows[rows[:, 1] == kind].tolist()]
+
+    def _rotors_at(self, q_rad: Floats) -> Floats:
+        turned: Floats = self._drive.coupling @ (q_rad - self._drive.zero) / self._drive.gear
+        return turned
+
+
+def _body(rig: Rig) -> layout.Body:
+    a, b = inertia_constants(rig.links)
+    return layout.Body(
+        a=a,
+        b=b,
+        lengths=np.array([link.length_m for link in rig.links]),
+        half_widths=np.array([max(0.5 * link.width_m, 5e-4) for link in rig.links]),
+        base=np.array(rig.base_m, dtype=float),
+        gravity=float(rig.gravity_m_s2),
+        viscous=np.array([joint.viscous_nm_s for joint in rig.joints]),
+        stops=np.array([joint.stops_rad for joint in rig.joints], dtype=float),
+    )
+
+
+def _drive(rig: Rig) -> layout.Drive:
+    motors = rig.motors
+    return layout.Drive(
+        coupling=np.ascontiguousarray(rig.coupling_matrix[: len(motors)]),
+        zero=rig.zeros,
+        gear=np.array([(-1.0 if m.reversed else 1.0) / m.gear_ratio for m in motors]),
+        half_play=np.array([0.5 * m.backlash_rad for m in motors]),
+        stiffness=np.array([m.stiffness_nm_rad for m in motors]),
+        gear_damping=np.array([m.output_damping_nm_s for m in motors]),
+        teeth=np.array([m.steps_per_rev / 4.0 for m in motors]),
+        torque_constant=np.array([m.torque_constant_nm_a for m in motors]),
+        detent=np.array([m.detent_torque_nm for m in motors]),
+        inertia=np.array([m.rotor_inertia_kg_m2 for m in motors]),
+        damping=np.array([m.damping_nm_s for m in motors]),
+        resistance=np.array([m.resistance_ohm for m in motors]),
+        inductance=np.array([m.inductance_h for m in motors]),
+        current=np.array([m.current_a for m in motors]),
+    )
+
+
+def _start(rig: Rig, drive: layout.Drive) -> layout.State:
+    n, m = len(rig.links), len(rig.motors)
+    start = np.array(rig.start_rad, dtype=float)
+    rotors = drive.coupling @ (start - drive.zero) / drive.gear
+    phase = np.rint(rotors * drive.teeth * 512.0 / np.pi) * (np.pi / 512.0)
+    return layout.State(
+        y=np.concatenate([np.cumsum(start), np.zeros(n), rotors, np.zeros(m)]),
+        currents=np.zeros((m, 2)),
+        phase=phase,
+        on=np.zeros(m, np.int64),
+        supply=np.array([motor.supply_v for motor in rig.motors]),
+        lost=np.zeros(m, np.int64),
+        friction=np.zeros(n),
+        rotor_friction=np.zeros(m),
+        coulomb=np.array([joint.coulomb_nm for joint in rig.joints]),
+        rotor_coulomb=np.array([motor.coulomb_nm for motor in rig.motors]),
+        outside=np.zeros(n),
+        touching=np.zeros((n, len(rig.obstacles))),
+        stopped=np.zeros(n, np.int64),
+    )
+
+
+def _switches(rig: Rig) -> layout.Switches:
+    pressed = [(rig.start_rad[s.joint] >= s.at_rad) == s.above for s in rig.switches]
+    return layout.Switches(
+        joint=np.array([s.joint for s in rig.switches], dtype=np.int64),
+        at=np.array([s.at_rad for s in rig.switches], dtype=float),
+        above=np.array([s.above for s in rig.switches], dtype=np.int64),
+        pressed=np.array(pressed, dtype=np.int64),
+    )
+
+
+def _fitting_step(rig: Rig) -> int:
+    """Return the longest step, 800 cycles halved so often as is needed, that follows the rotors' fastest vibration."""
+    omega = max(
+        (
+            np.sqrt(
+                (
+                    m.stiffness_nm_rad / m.gear_ratio**2
+                    + m.peak_torque_nm * m.steps_per_rev / 4.0
+                    + m.detent_torque_nm * m.steps_per_rev
+                )
+                / m.rotor_inertia_kg_m2
+            )
+            for m in rig.motors
+        ),
+        default=0.0,
+    )
+    step = LONGEST_STEP_CYCLES
+    while step > 1 and step / CYCLES_PER_S * omega > STABLE_SHARE and step % 2 == 0:
+        step //= 2
+    return step
