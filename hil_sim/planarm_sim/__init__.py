@@ -7,19 +7,22 @@
     uno = Uno.from_hex("blink.hex")
     uno.run(seconds=1)
     print(uno.edges("D13"))
+
+and around it, when asked for, a bench of drivers, motors and an arm (`planarm_sim.bench`).
 """
 
 from __future__ import annotations
 
+import importlib
 from typing import TYPE_CHECKING
 
 from planarm_sim.errors import SimError
-from planarm_sim.plant import CircleObstacle, Joint, LimitSwitch, Link, Motor, PolygonObstacle, Rig
 
 if TYPE_CHECKING:
     from planarm_sim.bench import Bench, BenchReport
-from planarm_sim.board import Pin, Uno, UnoSnapshot
-from planarm_sim.drivers import DriverWiring, driver_row
+    from planarm_sim.board import Pin, Uno, UnoSnapshot
+    from planarm_sim.drivers import DriverWiring, driver_row
+    from planarm_sim.plant import CircleObstacle, Joint, LimitSwitch, Link, Motor, PolygonObstacle, Rig
 
 __all__ = [
     "Bench",
@@ -39,11 +42,17 @@ __all__ = [
     "driver_row",
 ]
 
+_ROOMS = {
+    "bench": ("Bench", "BenchReport"),
+    "board": ("Pin", "Uno", "UnoSnapshot"),
+    "drivers": ("DriverWiring", "driver_row"),
+    "plant": ("CircleObstacle", "Joint", "LimitSwitch", "Link", "Motor", "PolygonObstacle", "Rig"),
+}
+_ROOM_OF = {name: room for room, names in _ROOMS.items() for name in names}
+
 
 def __getattr__(name: str) -> object:
-    """Import the board when it is first asked for: the pytest plugin is in every test run, Numba need not be."""
-    if name in __all__:
-        from planarm_sim import board  # noqa: PLC0415 - that is the point
-
-        return vars(board)[name]
+    """Import a room when it is first asked for: the pytest plugin is in every test run, Numba need not be."""
+    if name in _ROOM_OF:
+        return getattr(importlib.import_module(f"planarm_sim.{_ROOM_OF[name]}"), name)
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

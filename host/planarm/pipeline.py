@@ -13,7 +13,9 @@ from pathlib import Path
 from typing import Any
 
 from planarm.analysis.step_count import Waveform, compare_steps, measure_steps
+from planarm.arm_findings import SETTLE_S, ArmFindings, judge_arm, start_tick_of
 from planarm.errors import CertificateError, NoPathError, SceneError, StepsDifferError, TimingError
+from planarm.link.arm_record import ArmSetup, ArmTrace
 from planarm.link.exchange import StreamResult, stream_plan
 from planarm.link.transport import PinTrace, Transport, open_transport
 from planarm.model.arm import Arm
@@ -161,13 +163,17 @@ def run_scene(scene: Scene, port: str, out: Path, notice: Notice) -> dict[str, A
     """
     plan = plan_scene(scene, notice)
     begin_run_folder(out, stored(plan))
-    with closing(open_transport(port, scene.link.baud)) as transport:
+    setup = ArmSetup(scene, plan.segments.start_usteps)
+    with closing(open_transport(port, scene.link.baud, setup)) as transport:
         streamed = stream(plan.segments, plan.certificate, transport, notice)
         findings = judge_pins(plan.segments, transport.pins) if transport.pins else None
-    summary = summarise(plan, streamed, findings)
-    finish_run_folder(out, plan, summary, transport.pins)
+        arm = judge_emulated_arm(plan, findings, transport.arm) if findings and transport.arm else None
+    summary = summarise(plan, streamed, findings, arm)
+    finish_run_folder(out, plan, summary, transport.pins, arm)
     if findings and not findings.comparison.agrees:
         raise StepsDifferError(f"{scene.source}: {findings.comparison.explain()}; see {out}")
+    if arm and not arm.clean:
+        raise StepsDifferError(f"{scene.source}: {arm.explain()}; see {out}")
     return summary
 
 
@@ -193,6 +199,13 @@ def judge_pins(plan: SegmentPlan, trace: PinTrace) -> Findings:
     )
     planned = [(joint.ticks, joint.directions) for joint in expand(plan).steps]
     return Findings(measured, compare_steps(planned, measured))
+
+
+def judge_emulated_arm(plan: Plan, findings: Findings, trace: ArmTrace) -> ArmFindings:
+    """Let the emulated arm come to rest, and hold what it did against the plan."""
+    trace.settle(SETTLE_S)
+    planned = [joint.ticks for joint in expand(plan.segments).steps]
+    return judge_arm(plan, trace.record(), start_tick_of(planned, [joint.ticks for joint in findings.measured]))
 
 
 def _waveform(trace: PinTrace, pin: str) -> Waveform:

@@ -14,10 +14,11 @@ from planarm.model.kinematics import forward
 from planarm.model.shapes import shape_of
 from planarm.output import writing
 from planarm.plan_file import StoredPlan, save_plan
-from planarm.report import draw_joint_angles, draw_step_rates, draw_workspace
+from planarm.report import draw_joint_angles, draw_step_rates, draw_tip_error, draw_workspace
 from planarm_wire.messages import MIN_INTERVAL_TICKS, TICKS_HZ
 
 if TYPE_CHECKING:
+    from planarm.arm_findings import ArmFindings
     from planarm.link.transport import PinTrace
     from planarm.plan import Plan
 
@@ -36,7 +37,9 @@ def begin_run_folder(out: Path, stored: StoredPlan) -> None:
     save_plan(stored, out / "run.plan")
 
 
-def finish_run_folder(out: Path, plan: Plan, summary: Mapping[str, Any], trace: PinTrace | None) -> None:
+def finish_run_folder(
+    out: Path, plan: Plan, summary: Mapping[str, Any], trace: PinTrace | None, arm: ArmFindings | None = None
+) -> None:
     """Put everything else that a person or a program wants to keep of a run into the folder.
 
     Args:
@@ -44,6 +47,7 @@ def finish_run_folder(out: Path, plan: Plan, summary: Mapping[str, Any], trace: 
         plan: the plan with its stages.
         summary: the run's figures.
         trace: the emulated board's pins; None leaves out trace.vcd.
+        arm: what the emulated arm did; None leaves out tip_error.png.
 
     Raises:
         OutputError: a file cannot be written.
@@ -53,6 +57,8 @@ def finish_run_folder(out: Path, plan: Plan, summary: Mapping[str, Any], trace: 
         _draw(plan, *(out / name for name in ("workspace.png", "joint_angles.png", "step_rates.png")))
         if trace is not None:
             trace.write_vcd(out / "trace.vcd")
+        if arm is not None:
+            draw_tip_error(out / "tip_error.png", arm.t_s, arm.tip_error_mm, title=plan.scene.name)
 
 
 def _draw(plan: Plan, workspace: Path, joint_angles: Path, step_rates: Path) -> None:

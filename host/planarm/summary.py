@@ -13,17 +13,21 @@ from planarm.model.transmission import Transmission
 from planarm_wire.messages import TICKS_HZ
 
 if TYPE_CHECKING:
+    from planarm.arm_findings import ArmFindings
     from planarm.link.exchange import StreamResult
     from planarm.plan import Findings, Plan
 
 
-def summarise(plan: Plan, streamed: StreamResult, findings: Findings | None) -> dict[str, Any]:
+def summarise(
+    plan: Plan, streamed: StreamResult, findings: Findings | None, arm: ArmFindings | None = None
+) -> dict[str, Any]:
     """Return every figure of a run.
 
     Args:
         plan: what was planned.
         streamed: what the link and the device's ledger say.
         findings: what the pins showed; None when they cannot be seen (a port that is not in this process).
+        arm: what the emulated arm did; None when there is none.
     """
     scene = plan.scene
     by_ledger_usteps = moved_usteps(streamed.ledger_before, streamed.ledger_after)
@@ -47,6 +51,7 @@ def summarise(plan: Plan, streamed: StreamResult, findings: Findings | None) -> 
         "net_usteps": list(net_usteps),
         **tip_figures(plan, net_usteps),
         **_pin_figures(findings),
+        **(arm.figures() if arm else {}),
     }
 
 

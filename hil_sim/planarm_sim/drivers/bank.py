@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import difflib
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -11,10 +12,10 @@ from numpy.typing import NDArray
 
 from planarm_sim.board.pins import pin_name, pin_place
 from planarm_sim.drivers import judge
-from planarm_sim.drivers.table import RULES, DriverRow
 from planarm_sim.errors import UsageError
+from planarm_wire.drivers import DRIVERS, RULES, DriverRow
 
-__all__ = ["DriverBank", "DriverCounts", "DriverWiring", "Violation"]
+__all__ = ["DriverBank", "DriverCounts", "DriverWiring", "Violation", "driver_row"]
 
 CYCLES_PER_S = 16_000_000
 _NO_EDGES = np.zeros((0, 3), np.int64)
@@ -58,7 +59,7 @@ class Violation:
         cycle: clock cycle of the edge that broke it.
         driver: number of the driver, from 0.
         pin: the driver's STEP pin.
-        rule: one of `table.RULES`.
+        rule: one of `planarm_wire.drivers.RULES`.
         measured_ns: the time that was kept.
         limit_ns: the time that was needed.
     """
@@ -120,8 +121,8 @@ class DriverBank:
             if name is not None:
                 self._pins[d, role] = pin_place(name).index
         for rule, name in enumerate(RULES):
-            limit = row.limit_ns(name)
-            self._limits[d, rule] = -1.0 if limit is None else limit
+            limit_s = row.limit_s(name)
+            self._limits[d, rule] = -1.0 if limit_s is None else round(1e9 * limit_s, 3)
         self._limits[d, judge.COUNTS_DISABLED] = float(row.counts_disabled)
         self._limits[d, judge.HOME] = round(row.home_deg / 360.0 * judge.PHASE_TURN)
         for bits in range(8):
@@ -222,6 +223,18 @@ class DriverBank:
         """Go back to a snapshot."""
         self._state[:] = snapshot[0]
         self._violations = list(snapshot[1])
+
+
+def driver_row(name: str) -> DriverRow:
+    """Return a driver's row.
+
+    Raises:
+        UsageError: no such driver; the message names the closest.
+    """
+    if name in DRIVERS:
+        return DRIVERS[name]
+    close = difflib.get_close_matches(name, DRIVERS, n=1, cutoff=0.0)[0]
+    raise UsageError(f"no driver {name!r}; known: {', '.join(DRIVERS)}. Closest: {close}")
 
 
 def in_order(events: NDArray[np.int64]) -> NDArray[np.int64]:

@@ -51,7 +51,7 @@ INPUTS = 7
 STATE_COLUMNS = 21
 """WANTED is what the pulses asked for, COUNTED what the driver made of them, both in phase units since the start."""
 
-# Columns of a driver's limits, nanoseconds; negative: no such rule. The first eight are `table.RULES`.
+# Columns of a driver's limits, nanoseconds; negative: no such rule. The first eight are `planarm_wire.drivers.RULES`.
 HIGH, LOW, PERIOD, SETUP, HOLD, ENABLE, MODE, WAKE, COUNTS_DISABLED, HOME = range(10)
 LIMIT_COLUMNS = 10
 

@@ -22,6 +22,7 @@ class SerialTransport:
     """A line opened by pyserial, held exclusively, on the computer's clock."""
 
     pins = None
+    arm = None
 
     def __init__(self, url: str, baud: int) -> None:
         self.url = url

@@ -10,21 +10,23 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from planarm.errors import LinkError
+from planarm.link.arm_record import ArmSetup
 from planarm.link.clock import Clock
+from planarm.link.sim_bench import SimArm, build_bench
 from planarm_wire.messages import BAUD, DIR_PINS, ENABLE_PIN, STEP_PINS, TICKS_HZ
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from planarm_sim import Uno
+    from planarm_sim import Bench, Uno
 
 SLICE_CYCLES = 1600  # a reply is noticed at most 100 us, or 2.5 bytes at 250,000 baud, after it came
 
 
 class EmulatorClock:
-    """The emulated board's time; waiting runs the board."""
+    """The emulated board's time; waiting runs the board, and the arm with it."""
 
-    def __init__(self, uno: "Uno") -> None:
+    def __init__(self, uno: "Uno | Bench") -> None:
         self._uno = uno
 
     def now_s(self) -> float:
@@ -38,16 +40,24 @@ class EmulatorClock:
 
 
 class SimTransport:
-    """A line to an Uno emulated from a flash image; `pins` shows its edges, `uno` is the board itself."""
+    """A line to an Uno emulated from a flash image; `pins` shows its edges, `uno` is the board itself.
 
-    def __init__(self, image: str | Path, baud: int = BAUD) -> None:
+    With a setup drivers, motors and an arm stand around it, and `arm` shows what they do.
+    """
+
+    def __init__(self, image: str | Path, baud: int = BAUD, setup: ArmSetup | None = None) -> None:
         from planarm_sim import SimError, Uno  # noqa: PLC0415 - brings Numba, which only emulation needs
 
         try:
             self.uno = Uno.from_hex(image, baud=baud)
         except (SimError, OSError) as error:
             raise LinkError(f"port sim://: {error}") from error
-        self.clock: Clock = EmulatorClock(self.uno)
+        self._machine: Uno | Bench = self.uno
+        self.arm: SimArm | None = None
+        if setup is not None:
+            self._machine = build_bench(self.uno, setup)
+            self.arm = SimArm(self._machine)
+        self.clock: Clock = EmulatorClock(self._machine)
         self.pins = EmulatorPins(self.uno)
         self._received = bytearray()
         self._open = True
@@ -58,7 +68,7 @@ class SimTransport:
         uno = self.uno
         self._received += uno.serial.read()
         while not self._received and uno.cycle / TICKS_HZ < deadline_s:
-            _run(uno, min(uno.cycle + SLICE_CYCLES, _cycle_after(deadline_s)))
+            _run(self._machine, min(uno.cycle + SLICE_CYCLES, _cycle_after(deadline_s)))
             self._received += uno.serial.read()
         data = bytes(self._received[:max_bytes])
         del self._received[:max_bytes]
@@ -98,7 +108,7 @@ def _cycle_after(t_s: float) -> float:
     return math.floor(t_s * TICKS_HZ) + 1 if math.isfinite(t_s) else t_s
 
 
-def _run(uno: "Uno", cycle: float) -> None:
+def _run(uno: "Uno | Bench", cycle: float) -> None:
     """Run to `cycle`; an instruction may end a little later."""
     from planarm_sim import SimError  # noqa: PLC0415
 

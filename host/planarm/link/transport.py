@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 from urllib.parse import parse_qs, urlsplit
 
 from planarm.errors import LinkError
+from planarm.link.arm_record import ArmSetup, ArmTrace
 from planarm.link.clock import Clock
 from planarm_wire.messages import BAUD
 
@@ -49,6 +50,11 @@ class Transport(Protocol):
         """The board's pins when it is an emulated one, else None."""
         ...
 
+    @property
+    def arm(self) -> ArmTrace | None:
+        """The arm behind the board when it is an emulated one, else None."""
+        ...
+
     def read(self, max_bytes: int, deadline_s: float) -> bytes:
         """Return 1 to `max_bytes` bytes as soon as there are any, or b"" once the clock shows `deadline_s`.
 
@@ -65,20 +71,30 @@ class Transport(Protocol):
         ...
 
 
-def open_transport(url: str, baud: int = BAUD) -> Transport:
-    """Open the line that `url` names, at `baud` where that has a meaning; LinkError tells why it cannot be opened."""
+def open_transport(url: str, baud: int = BAUD, setup: ArmSetup | None = None) -> Transport:
+    """Open the line that `url` names.
+
+    Args:
+        url: see the module's text.
+        baud: where that has a meaning.
+        setup: what stands around an emulated board; others have what they have.
+
+    Raises:
+        LinkError: it cannot be opened; the message tells why.
+        EmulatorError: the setup cannot be built.
+    """
     scheme, separator, _ = url.partition("://")
     if not separator or scheme.lower() in PYSERIAL_SCHEMES:
         from planarm.link.serial_transport import SerialTransport  # noqa: PLC0415 - pyserial only where it is used
 
         return SerialTransport(url, baud)
     if scheme.lower() == SIM_SCHEME:
-        return _open_emulator(url, baud)
+        return _open_emulator(url, baud, setup)
     known = ", ".join(f"{name}://" for name in (SIM_SCHEME, *PYSERIAL_SCHEMES))
     raise LinkError(f"port {url!r}: unknown scheme {scheme!r}; give a device path or one of {known}")
 
 
-def _open_emulator(url: str, baud: int) -> Transport:
+def _open_emulator(url: str, baud: int, setup: ArmSetup | None) -> Transport:
     from planarm.link.released_image import released_image  # noqa: PLC0415
     from planarm.link.sim_transport import SimTransport  # noqa: PLC0415 - the emulator only where it is used
 
@@ -87,4 +103,4 @@ def _open_emulator(url: str, baud: int) -> Transport:
     if parts.netloc or parts.path or set(options) - {"image"}:
         raise LinkError(f"port {url!r}: the emulator takes sim:// or sim://?image=PATH")
     images = options.get("image")
-    return SimTransport(images[-1] if images else released_image(), baud)
+    return SimTransport(images[-1] if images else released_image(), baud, setup)

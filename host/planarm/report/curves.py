@@ -107,6 +107,30 @@ def draw_step_rates(
     _finish(figure, panels, title, subtitle, path_png)
 
 
+def draw_tip_error(
+    path_png: Path | str, t_s: ArrayLike, error_mm: ArrayLike, *, title: str, subtitle: str = ""
+) -> None:
+    """Draw how far the end effector was from where the plan has it, over seconds, with its largest value.
+
+    Args:
+        path_png: the file to write.
+        t_s: times, ascending, shape (m,), m >= 1.
+        error_mm: distances, shape (m,).
+        title: above the picture.
+        subtitle: a quiet line below the title.
+    """
+    times, errors = np.asarray(t_s, dtype=np.float64), np.asarray(error_mm, dtype=np.float64)
+    figure, panels = _panels(1)
+    axes, worst = panels[0], int(np.argmax(errors))
+    axes.fill_between(times, errors, color=JOINT_COLOURS[0], alpha=0.16, linewidth=0)
+    axes.plot(times, errors, color=JOINT_COLOURS[0], linewidth=1.2)
+    axes.plot(times[worst], errors[worst], "o", color=JOINT_COLOURS[0], markeredgecolor="white", markersize=7)
+    axes.set_ylabel("tip error (mm)", fontsize=TEXT_SIZE, color=INK)
+    axes.set_ylim(0.0, max(1.15 * float(errors[worst]), 1e-3))
+    _note(axes, f"largest {errors[worst]:.3f} mm at {times[worst]:.3f} s")
+    _finish(figure, panels, title, subtitle, path_png)
+
+
 def _step_rates(
     ticks: NDArray[np.int64], signs: NDArray[np.float64], ticks_hz: float, joint: int
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

@@ -24,7 +24,7 @@ TRANSMISSION_KEYS = ("coupling",)
 LINK_KG_PER_CM = 0.004
 """A square aluminium tube of 20 x 20 x 2 mm weighs 0.39 kg a metre (144 mm^2, 2700 kg/m^3)."""
 COULOMB_NM = 0.02
-VISCOUS_NM_S = 0.01
+VISCOUS_NM_S = 0.05
 STIFFNESS_NM_RAD = 1000.0
 LARGEST_CONDITION = 1e6
 

@@ -1,21 +1,19 @@
 """Step/dir drivers as rows of data: what each asks of its inputs, and where each value is from.
 
-Times are minima in nanoseconds; None where the maker states no such rule. The makers' sheets were read through code
-and pages that quote them, named per row in `source`; where two disagree the row says so.
+Host and emulator both read them: one to plan and to judge waveforms, the other to enforce them. Times are minima in
+seconds; None where the maker states no such rule, or one that follows from the others. The makers' sheets were read
+through code and pages that quote them, named per row in `source`; where two disagree the row says so.
 """
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from planarm_sim.errors import UsageError
-
-__all__ = ["DRIVERS", "RULES", "DriverRow", "driver_row"]
+__all__ = ["DRIVERS", "RULES", "DriverRow"]
 
 RULES = ("step_high", "step_low", "step_period", "dir_setup", "dir_hold", "enable_setup", "mode_setup", "wake_up")
-"""Names of the rules, in the order of their numbers in `drivers.judge`."""
+"""Names of the rules, each a column with the suffix _s."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,14 +23,14 @@ class DriverRow:
     Attributes:
         name: as a scene has it.
         title: as people call it.
-        step_high_ns: STEP high. Shorter: no step.
-        step_low_ns: STEP low between two pulses. Shorter: the pulses are one, the second makes no step.
-        step_period_ns: from rise to rise. Shorter: no step.
-        dir_setup_ns: DIR before the rise of STEP. Shorter: a step the old way.
-        dir_hold_ns: DIR after the rise of STEP. Shorter: a step the new way.
-        enable_setup_ns: ENABLE before the rise of STEP. Shorter: the step is lost.
-        mode_setup_ns: micro-step pins before the rise of STEP. Shorter: a step of the old size.
-        wake_up_ns: from SLEEP released, or from motor supply, to the first step. Shorter: the step is lost.
+        step_high_s: STEP high. Shorter: no step.
+        step_low_s: STEP low between two pulses. Shorter: the pulses are one, the second makes no step.
+        step_period_s: from rise to rise. Shorter: no step.
+        dir_setup_s: DIR before the rise of STEP. Shorter: a step the old way.
+        dir_hold_s: DIR after the rise of STEP. Shorter: a step the new way.
+        enable_setup_s: ENABLE before the rise of STEP. Shorter: the step is lost.
+        mode_setup_s: micro-step pins before the rise of STEP. Shorter: a step of the old size.
+        wake_up_s: from SLEEP released, or from motor supply, to the first step. Shorter: the step is lost.
         modes: micro-steps by the levels of the mode pins, first pin first; empty when switches on the board set them.
         microsteps: every resolution it has.
         counts_disabled: whether steps still move its phase while ENABLE is off.
@@ -42,23 +40,23 @@ class DriverRow:
 
     name: str
     title: str
-    step_high_ns: float
-    step_low_ns: float
-    step_period_ns: float | None
-    dir_setup_ns: float | None
-    dir_hold_ns: float | None
-    enable_setup_ns: float | None
-    mode_setup_ns: float | None
-    wake_up_ns: float | None
+    step_high_s: float
+    step_low_s: float
+    step_period_s: float | None
+    dir_setup_s: float | None
+    dir_hold_s: float | None
+    enable_setup_s: float | None
+    mode_setup_s: float | None
+    wake_up_s: float | None
     modes: Mapping[tuple[int, ...], int]
     microsteps: tuple[int, ...]
     counts_disabled: bool
     home_deg: float
     source: Mapping[str, str]
 
-    def limit_ns(self, rule: str) -> float | None:
-        """The least time of a rule of RULES, in nanoseconds."""
-        value: float | None = getattr(self, f"{rule}_ns")
+    def limit_s(self, rule: str) -> float | None:
+        """The least time of a rule of RULES, in seconds."""
+        value: float | None = getattr(self, f"{rule}_s")
         return value
 
 
@@ -75,14 +73,14 @@ _ROWS = (
     DriverRow(
         name="a4988",
         title="Allegro A4988",
-        step_high_ns=1000.0,
-        step_low_ns=1000.0,
-        step_period_ns=None,
-        dir_setup_ns=200.0,
-        dir_hold_ns=200.0,
-        enable_setup_ns=200.0,
-        mode_setup_ns=200.0,
-        wake_up_ns=1_000_000.0,
+        step_high_s=1e-6,
+        step_low_s=1e-6,
+        step_period_s=None,
+        dir_setup_s=0.2e-6,
+        dir_hold_s=0.2e-6,
+        enable_setup_s=0.2e-6,
+        mode_setup_s=0.2e-6,
+        wake_up_s=1000e-6,
         modes=_A4988_MODES,
         microsteps=(1, 2, 4, 8, 16),
         counts_disabled=True,
@@ -97,14 +95,14 @@ _ROWS = (
     DriverRow(
         name="drv8825",
         title="Texas Instruments DRV8825",
-        step_high_ns=1900.0,
-        step_low_ns=1900.0,
-        step_period_ns=4000.0,
-        dir_setup_ns=650.0,
-        dir_hold_ns=650.0,
-        enable_setup_ns=650.0,
-        mode_setup_ns=650.0,
-        wake_up_ns=1_700_000.0,
+        step_high_s=1.9e-6,
+        step_low_s=1.9e-6,
+        step_period_s=4e-6,
+        dir_setup_s=0.65e-6,
+        dir_hold_s=0.65e-6,
+        enable_setup_s=0.65e-6,
+        mode_setup_s=0.65e-6,
+        wake_up_s=1700e-6,
         modes=_DRV8825_MODES,
         microsteps=(1, 2, 4, 8, 16, 32),
         counts_disabled=True,
@@ -119,14 +117,14 @@ _ROWS = (
         DriverRow(
             name=name,
             title=f"Trinamic {name.upper()}, stand-alone",
-            step_high_ns=100.0,
-            step_low_ns=100.0,
-            step_period_ns=None,
-            dir_setup_ns=20.0,
-            dir_hold_ns=20.0,
-            enable_setup_ns=None,
-            mode_setup_ns=None,
-            wake_up_ns=None,
+            step_high_s=0.1e-6,
+            step_low_s=0.1e-6,
+            step_period_s=None,
+            dir_setup_s=0.02e-6,
+            dir_hold_s=0.02e-6,
+            enable_setup_s=None,
+            mode_setup_s=None,
+            wake_up_s=None,
             modes=modes,
             microsteps=tuple(sorted(modes.values())),
             counts_disabled=True,
@@ -145,14 +143,14 @@ _ROWS = (
     DriverRow(
         name="dm542",
         title="Leadshine DM542 and its kin",
-        step_high_ns=2500.0,
-        step_low_ns=2500.0,
-        step_period_ns=5000.0,
-        dir_setup_ns=5000.0,
-        dir_hold_ns=None,
-        enable_setup_ns=5000.0,
-        mode_setup_ns=None,
-        wake_up_ns=None,
+        step_high_s=2.5e-6,
+        step_low_s=2.5e-6,
+        step_period_s=None,
+        dir_setup_s=5e-6,
+        dir_hold_s=None,
+        enable_setup_s=5e-6,
+        mode_setup_s=None,
+        wake_up_s=None,
         modes={},
         microsteps=(1, 2, 4, 8, 16, 32, 64, 128),
         counts_disabled=False,
@@ -166,14 +164,14 @@ _ROWS = (
     DriverRow(
         name="tb6600",
         title="TB6600 boards",
-        step_high_ns=3000.0,
-        step_low_ns=3000.0,
-        step_period_ns=None,
-        dir_setup_ns=1500.0,
-        dir_hold_ns=1500.0,
-        enable_setup_ns=None,
-        mode_setup_ns=None,
-        wake_up_ns=None,
+        step_high_s=3e-6,
+        step_low_s=3e-6,
+        step_period_s=None,
+        dir_setup_s=1.5e-6,
+        dir_hold_s=1.5e-6,
+        enable_setup_s=None,
+        mode_setup_s=None,
+        wake_up_s=None,
         modes={},
         microsteps=(1, 2, 4, 8, 16, 32),
         counts_disabled=False,
@@ -187,15 +185,3 @@ _ROWS = (
 
 DRIVERS: Mapping[str, DriverRow] = {row.name: row for row in _ROWS}
 """Every driver by name."""
-
-
-def driver_row(name: str) -> DriverRow:
-    """Return a driver's row.
-
-    Raises:
-        UsageError: no such driver; the message names the closest.
-    """
-    if name in DRIVERS:
-        return DRIVERS[name]
-    close = difflib.get_close_matches(name, DRIVERS, n=1, cutoff=0.0)[0]
-    raise UsageError(f"no driver {name!r}; known: {', '.join(DRIVERS)}. Closest: {close}")

@@ -1,0 +1,136 @@
+"""The emulated arm of a scene, built from plain values: the emulator moves it by itself. A door to the emulator."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from planarm.errors import EmulatorError
+from planarm.link.arm_record import ArmRecord, ArmSetup, BrokenRule, LostSteps, Touch
+from planarm.model.shapes import Circle, shape_of
+from planarm.model.transmission import Transmission
+from planarm.scene import JointSpec, Obstacle, Scene
+from planarm_wire.messages import DIR_PINS, ENABLE_PIN, STEP_PINS
+
+if TYPE_CHECKING:
+    from planarm_sim import Bench, CircleObstacle, DriverWiring, Motor, PolygonObstacle, Rig, Uno
+
+CM = 0.01
+GRAVITY_M_S2 = 9.80665
+
+
+class SimArm:
+    """The arm behind an emulated board."""
+
+    def __init__(self, bench: Bench) -> None:
+        self._bench = bench
+
+    def record(self) -> ArmRecord:
+        """Return what it did so far."""
+        motion, report = self._bench.motion(), self._bench.report()
+        touches = [Touch(c.cycle, c.link + 1, c.obstacle + 1) for c in report.contacts]
+        touches += [Touch(hit.cycle, hit.joint + 1, 0) for hit in report.stop_hits]
+        return ArmRecord(
+            ticks=motion["cycle"],
+            q_rad=motion["q_rad"],
+            lost_full_steps=report.lost_full_steps,
+            lost=tuple(LostSteps(s.cycle, s.motor + 1, s.full_steps) for s in report.slips),
+            broken_rules=tuple(
+                BrokenRule(v.cycle, v.driver + 1, v.rule, 1e-3 * v.measured_ns, 1e-3 * v.limit_ns)
+                for v in report.violations
+            ),
+            touches=tuple(sorted(touches, key=lambda touch: touch.ticks)),
+        )
+
+    def settle(self, seconds: float) -> None:
+        """Let emulated time pass, so that the arm comes to rest."""
+        self._bench.run(seconds=seconds)
+
+
+def build_bench(uno: Uno, setup: ArmSetup) -> Bench:
+    """Put the scene's drivers, motors and arm around an emulated board.
+
+    Raises:
+        EmulatorError: a driver has no such micro-steps.
+    """
+    from planarm_sim import Bench, SimError  # noqa: PLC0415 - brings Numba, which only emulation needs
+
+    try:
+        return Bench(uno, rig_of(setup.scene, setup.start_usteps), drivers_of(setup.scene))
+    except SimError as error:
+        raise EmulatorError(f"{setup.scene.source}: joints.driver, joints.microsteps: {error}") from error
+
+
+def rig_of(scene: Scene, start_usteps: tuple[int, ...]) -> Rig:
+    """Return the scene's arm, standing where its motors are at `start_usteps`."""
+    from planarm_sim import Joint, Link, Rig  # noqa: PLC0415
+
+    mechanics = scene.mechanics
+    lengths_m = [CM * length for length in scene.arm.link_lengths_cm]
+    links = tuple(
+        Link(length, mass, share * length, inertia, end, CM * scene.arm.link_width_cm)
+        for length, mass, share, inertia, end in zip(
+            lengths_m,
+            mechanics.link_masses_kg,
+            mechanics.link_com_share,
+            mechanics.link_inertias_kg_m2,
+            mechanics.end_masses_kg,
+            strict=True,
+        )
+    )
+    joints = tuple(
+        Joint(coulomb, viscous)
+        for coulomb, viscous in zip(mechanics.coulomb_friction_nm, mechanics.viscous_friction_nm_s, strict=True)
+    )
+    return Rig(
+        links=links,
+        joints=joints,
+        motors=tuple(_motor(scene, number, joint) for number, joint in enumerate(scene.joints)),
+        start_rad=tuple(Transmission.of(scene).q_rad(np.array(start_usteps)).tolist()),
+        zero_rad=tuple(joint.zero_offset_rad for joint in scene.joints),
+        coupling=scene.coupling,
+        gravity_m_s2=GRAVITY_M_S2 if mechanics.gravity else 0.0,
+        base_m=(CM * scene.arm.base_cm[0], CM * scene.arm.base_cm[1]),
+        obstacles=tuple(_obstacle(obstacle) for obstacle in scene.obstacles),
+    )
+
+
+def drivers_of(scene: Scene) -> list[DriverWiring]:
+    """Return the scene's drivers on the pins of the firmware; joints beyond its pins have none."""
+    from planarm_sim import DriverWiring, driver_row  # noqa: PLC0415
+
+    return [
+        DriverWiring(driver_row(joint.driver), step, direction, ENABLE_PIN, microsteps=joint.microsteps)
+        for joint, step, direction in zip(scene.joints, STEP_PINS, DIR_PINS, strict=False)
+    ]
+
+
+def _motor(scene: Scene, number: int, joint: JointSpec) -> Motor:
+    from planarm_sim import Motor  # noqa: PLC0415
+
+    spec, mechanics = joint.motor, scene.mechanics
+    return Motor(
+        steps_per_rev=joint.steps_per_rev,
+        holding_torque_nm=spec.holding_torque_nm,
+        rated_current_a=spec.rated_current_a,
+        current_a=spec.current_a,
+        resistance_ohm=spec.resistance_ohm,
+        inductance_h=spec.inductance_h,
+        supply_v=spec.supply_v,
+        rotor_inertia_kg_m2=spec.rotor_inertia_kg_m2,
+        detent_torque_nm=spec.detent_torque_nm,
+        gear_ratio=joint.gear_ratio,
+        reversed=joint.reversed,
+        backlash_rad=mechanics.backlash_rad[number],
+        stiffness_nm_rad=mechanics.stiffness_nm_rad[number],
+    )
+
+
+def _obstacle(obstacle: Obstacle) -> CircleObstacle | PolygonObstacle:
+    from planarm_sim import CircleObstacle, PolygonObstacle  # noqa: PLC0415
+
+    shape = shape_of(obstacle)
+    if isinstance(shape, Circle):
+        return CircleObstacle((CM * shape.center_cm[0], CM * shape.center_cm[1]), CM * shape.radius_cm)
+    return PolygonObstacle(tuple((CM * x, CM * y) for x, y in shape.vertices_cm))
