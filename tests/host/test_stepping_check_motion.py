@@ -5,13 +5,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from host_scenes import make_scene
 from motion_paths import joint, joint_line
-from planarm.stepping.check_motion import check_deviation, check_limits
+from planarm.stepping.check_motion import Planned, check_deviation, check_limits
+from planarm.stepping.poses import motor_positions
 from planarm.stepping.quantise import quantise
 from planarm.stepping.train import JointSteps
 from planarm.trajectory.timing import time_path
 
 JOINTS = (joint(), joint(1.5, 8.0))
+SCENE = replace(make_scene(), joints=JOINTS)
 
 
 @pytest.fixture(scope="module")
@@ -21,7 +24,7 @@ def motion():
 
 def test_planned_speeds_and_accelerations_are_those_of_the_motion(motion):
     # Joint 2 goes 1.2 rad, joint 1 the same motion scaled by 1 / 1.2; joint 2 has the lower limits: 1.5 and 0.8 x 8.
-    values = {check.name: check.value for check in check_limits(motion, JOINTS)}
+    values = {check.name: check.value for check in check_limits(Planned.of(motion), JOINTS)}
     assert values["joint 2 planned speed"] == pytest.approx(1.5, rel=1e-3)
     assert values["joint 2 planned acceleration"] == pytest.approx(6.4, rel=1e-3)
     assert values["joint 1 planned speed"] == pytest.approx(1.25, rel=1e-3)
@@ -35,7 +38,7 @@ def test_steps_that_are_late_or_early_are_found(motion, shift_ticks, verdict):
     first, second = train.steps
     middle = (first.ticks > 0.4 * train.duration_ticks) & (first.ticks < 0.6 * train.duration_ticks)
     made = replace(train, steps=(JointSteps(first.ticks + middle * shift_ticks, first.directions), second))
-    one, two = check_deviation(motion, made, JOINTS)
+    one, two = check_deviation(motion, SCENE, made, motor_positions(made))
     assert one.verdict == verdict
     assert one.value == pytest.approx(0.5 + abs(shift_ticks) / 5027, abs=0.01)
     assert two.verdict == "green"
@@ -44,5 +47,6 @@ def test_steps_that_are_late_or_early_are_found(motion, shift_ticks, verdict):
 def test_a_motion_without_steps_must_not_go_far(motion):
     train = quantise(motion, JOINTS)
     still = JointSteps(np.zeros(0, np.int64), np.zeros(0, np.int8))
-    checks = check_deviation(motion, replace(train, steps=(still, still)), JOINTS)
+    made = replace(train, steps=(still, still))
+    checks = check_deviation(motion, SCENE, made, motor_positions(made))
     assert [check.verdict for check in checks] == ["red", "red"]

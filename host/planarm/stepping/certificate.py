@@ -1,6 +1,7 @@
 """What a certificate is: checks of a finished plan, each with its value, its limit and the setting to change."""
 
 from dataclasses import dataclass
+from math import inf
 from typing import Literal
 
 Verdict = Literal["green", "amber", "red"]
@@ -50,16 +51,28 @@ class Certificate:
 
 
 def at_most(
-    name: str, value: float, limit: float, unit: str, where: str = "", setting: str = "", rounding: float = 0.0
+    name: str,
+    value: float,
+    limit: float,
+    unit: str,
+    where: str = "",
+    setting: str = "",
+    rounding: float = 0.0,
+    amber: float = inf,
 ) -> Check:
-    """Return a check that is green while the value exceeds the limit by no more than rounding; NaN is red."""
-    verdict: Verdict = "green" if value <= limit + rounding else "red"
+    """Return a check that is red where the value exceeds the limit by more than rounding, amber above `amber`.
+
+    NaN is red.
+    """
+    verdict: Verdict = "red" if not value <= limit + rounding else "amber" if value > amber else "green"
     return Check(name, float(value), float(limit), unit, verdict, where, setting)
 
 
-def at_least(name: str, value: float, limit: float, unit: str, where: str = "", setting: str = "") -> Check:
-    """Return a check that is green while the value does not fall below the limit; NaN is red."""
-    verdict: Verdict = "green" if value >= limit else "red"
+def at_least(
+    name: str, value: float, limit: float, unit: str, where: str = "", setting: str = "", amber: float = -inf
+) -> Check:
+    """Return a check that is red where the value falls below the limit, amber below `amber`; NaN is red."""
+    verdict: Verdict = "red" if not value >= limit else "amber" if value < amber else "green"
     return Check(name, float(value), float(limit), unit, verdict, where, setting)
 
 

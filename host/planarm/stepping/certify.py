@@ -1,17 +1,22 @@
 """Certify a finished plan from its segments, by code that made none of it.
 
-The segments are expanded again in plain integers; limits, gaps, counts, times and clearances are then computed from
+The segments are expanded again by code of its own; limits, gaps, counts, times and clearances are then computed from
 those steps. `streaming` takes no plan whose certificate is not `ok`.
 """
 
 from planarm.model.transmission import motor_axes
 from planarm.scene import Scene
 from planarm.stepping.certificate import Certificate, Check
-from planarm.stepping.check_motion import check_deviation, check_limits
+from planarm.stepping.check_board import check_board
+from planarm.stepping.check_motion import Planned, check_deviation, check_limits
 from planarm.stepping.check_space import check_space
-from planarm.stepping.check_steps import check_counts, check_gaps, check_wire
+from planarm.stepping.check_steps import check_counts, check_gaps
+from planarm.stepping.check_torque import check_torque
+from planarm.stepping.check_wire import check_calm, check_wire
 from planarm.stepping.expand import expand
 from planarm.stepping.plan import SegmentPlan
+from planarm.stepping.poses import motor_positions
+from planarm.stepping.table import table_of
 from planarm.stepping.train import StepTrain
 from planarm.trajectory.motion import Trajectory
 
@@ -29,11 +34,17 @@ def certify(scene: Scene, trajectory: Trajectory, train: StepTrain, plan: Segmen
     """
     made = expand(plan)
     axes = motor_axes(scene.joints, scene.coupling)
-    checks = check_wire(plan)
+    table, at = table_of(plan), motor_positions(made)
+    checks = check_wire(plan, table)
+    checks.append(check_calm(table, made, axes))
+    checks += check_board(table, made, scene.link)
     for number in range(1, len(scene.joints) + 1):
         checks += check_counts(train, made, number)
         checks += check_gaps(made, axes, number)
-    checks += check_limits(trajectory, scene.joints)
-    checks += check_deviation(trajectory, made, scene.joints, scene.coupling)
-    checks += check_space(scene, made)
+    if trajectory.duration_s > 0.0:
+        planned = Planned.of(trajectory)
+        checks += check_limits(planned, scene.joints)
+        checks += check_torque(planned, scene)
+    checks += check_deviation(trajectory, scene, made, at)
+    checks += check_space(scene, made, at)
     return Certificate(tuple(checks))

@@ -4,11 +4,15 @@ Speeds and accelerations are differences of the planned angles, so neither the p
 asked.
 """
 
+from dataclasses import dataclass
+from typing import Self
+
 import numpy as np
 
 from planarm.model.transmission import Transmission, motor_axes
-from planarm.scene import JointSpec, Matrix
+from planarm.scene import JointSpec, Scene
 from planarm.stepping.certificate import Check, at_most
+from planarm.stepping.poses import MotorPositions
 from planarm.stepping.quantise import TIMING_USTEPS, hysteresis_usteps
 from planarm.stepping.train import Floats, StepTrain
 from planarm.trajectory.motion import Trajectory
@@ -20,16 +24,40 @@ ROUNDING = 1e-6
 """Share of a limit by which differences of doubles may miss it: 1e-16 rad over (0.1 ms)^2 is 1e-8 rad/s^2."""
 
 
-def check_limits(trajectory: Trajectory, joints: tuple[JointSpec, ...]) -> list[Check]:
+@dataclass(frozen=True, slots=True, eq=False)
+class Planned:
+    """The planned angles at even times, the only thing that these checks take from the planner.
+
+    Attributes:
+        t_s: from start to end, shape (n,).
+        q_rad: shape (n, joints).
+    """
+
+    t_s: Floats
+    q_rad: Floats
+
+    @classmethod
+    def of(cls, trajectory: Trajectory) -> Self:
+        """Look at a motion POINTS_PER_S times a second."""
+        count = max(LEAST_POINTS, int(POINTS_PER_S * trajectory.duration_s))
+        t_s = np.linspace(0.0, trajectory.duration_s, count)
+        return cls(t_s, trajectory.sample(t_s)[0])
+
+    @property
+    def speeds_rad_s(self) -> Floats:
+        """Mean speed between neighbouring times, shape (n - 1, joints)."""
+        return np.asarray(np.diff(self.q_rad, axis=0) / self.t_s[1])
+
+    @property
+    def accelerations_rad_s2(self) -> Floats:
+        """Acceleration around each inner time, shape (n - 2, joints)."""
+        return np.asarray(np.diff(self.q_rad, n=2, axis=0) / self.t_s[1] ** 2)
+
+
+def check_limits(planned: Planned, joints: tuple[JointSpec, ...]) -> list[Check]:
     """Check each joint's planned speed and acceleration."""
-    if trajectory.duration_s == 0.0:
-        return []
-    count = max(LEAST_POINTS, int(POINTS_PER_S * trajectory.duration_s))
-    t_s = np.linspace(0.0, trajectory.duration_s, count)
-    q_rad, _, _ = trajectory.sample(t_s)
-    step_s = t_s[1]
-    speeds = np.abs(np.diff(q_rad, axis=0)) / step_s
-    accelerations = np.abs(np.diff(q_rad, n=2, axis=0)) / step_s**2
+    t_s = planned.t_s
+    speeds, accelerations = np.abs(planned.speeds_rad_s), np.abs(planned.accelerations_rad_s2)
     checks = []
     for number, joint in enumerate(joints, start=1):
         for name, values, limit, unit, key in (
@@ -45,23 +73,18 @@ def check_limits(trajectory: Trajectory, joints: tuple[JointSpec, ...]) -> list[
     return checks
 
 
-def check_deviation(
-    trajectory: Trajectory, made: StepTrain, joints: tuple[JointSpec, ...], coupling: Matrix | None = None
-) -> list[Check]:
-    """Check how far each motor's steps are from the planned angle: before and after every step, and at both ends."""
-    transmission = Transmission.from_joints(joints, coupling)
-    end_tick = np.array([0, made.duration_ticks])
+def check_deviation(trajectory: Trajectory, scene: Scene, made: StepTrain, at: MotorPositions) -> list[Check]:
+    """Check how far each motor is from its planned angle: around every step of any motor, and at both ends."""
+    transmission = Transmission.of(scene)
+    ticks = np.concatenate([[0], at.ticks, [made.duration_ticks]])
+    planned = transmission.usteps(trajectory.sample(ticks / TICKS_HZ)[0])
+    deviation = np.abs(np.concatenate([[made.start_usteps], at.after_usteps, [made.end_usteps]]) - planned)
+    before: Floats = np.abs(np.concatenate([[made.start_usteps], at.before_usteps, [made.end_usteps]]) - planned)
+    deviation = np.maximum(deviation, before)
     checks = []
-    for number, (axis, steps) in enumerate(zip(motor_axes(joints, coupling), made.steps, strict=True), start=1):
-        start = made.start_usteps[number - 1]
-        after = start + np.cumsum(steps.directions, dtype=np.int64)
-        final = int(after[-1]) if len(after) else start
-        ticks = np.concatenate([steps.ticks, steps.ticks, end_tick])
-        positions = np.concatenate([after, after - steps.directions, [start, final]])
-        planned = transmission.usteps(trajectory.sample(ticks / TICKS_HZ)[0])[:, number - 1]
-        deviation: Floats = np.abs(positions - planned)
-        worst = int(np.argmax(deviation))
-        allowed = 0.5 + TIMING_USTEPS + hysteresis_usteps(axis)
+    for number, axis in enumerate(motor_axes(scene.joints, scene.coupling), start=1):
+        worst = int(np.argmax(deviation[:, number - 1]))
+        value, allowed = deviation[worst, number - 1], 0.5 + TIMING_USTEPS + hysteresis_usteps(axis)
         where = f"{ticks[worst] / TICKS_HZ:.6f} s"
-        checks.append(at_most(f"joint {number} deviation from the plan", deviation[worst], allowed, "usteps", where))
+        checks.append(at_most(f"joint {number} deviation from the plan", value, allowed, "usteps", where))
     return checks

@@ -1,55 +1,48 @@
-"""Certificate, part three: the arm in space at every micro-step of the expanded segments.
-
-Between two neighbouring poses one joint, or several at the same tick, moves by a micro-step. The pose in the middle is
-taken, and no point of the arm is farther from it than half a micro-step at each moving joint's lever: with that taken
-off, the middle's clearance holds for both neighbours and for everything between them.
-"""
-
-from dataclasses import dataclass
-from itertools import pairwise
+"""Certificate: the arm in space at every micro-step of the expanded segments."""
 
 import numpy as np
 
-from planarm.model.shapes import shape_of
+from planarm.model.shapes import obstacle_set, shape_of
 from planarm.model.transmission import Transmission
 from planarm.scene import Scene
 from planarm.stepping.certificate import Check, Verdict, at_least, at_most
-from planarm.stepping.clearance import joint_positions_cm, link_clearance_cm
-from planarm.stepping.train import Floats, StepTrain, Ticks
+from planarm.stepping.clearance import clearances_cm
+from planarm.stepping.poses import MotorPositions, Poses, poses_of
+from planarm.stepping.train import Floats, StepTrain
 from planarm_wire.messages import TICKS_HZ
 
 ROUNDING_CM = 1e-9
 
-
-@dataclass(frozen=True, slots=True)
-class _Poses:
-    """Poses in the middle of every change, and those at rest before and after the motion."""
-
-    ticks: Ticks
-    q_rad: Floats
-    reach_cm: Floats
-    """Bound of any arm point's displacement between the pose and its neighbours."""
+AMBER_BEND_RAD = np.radians(5.0)
+"""An inner joint nearer than this to straight or folded is amber: there the tip cannot be moved in every direction."""
 
 
-def check_space(scene: Scene, made: StepTrain) -> list[Check]:
-    """Check clearance, joint limits, and where the tip starts and ends."""
-    poses = _poses(scene, made)
-    positions = joint_positions_cm(scene.arm.link_lengths_cm, scene.arm.base_cm, poses.q_rad)
+def check_space(scene: Scene, made: StepTrain, at: MotorPositions) -> list[Check]:
+    """Check clearance, joint limits, the distance from singular poses, and where the tip starts and ends.
+
+    Args:
+        scene: what was asked for.
+        made: the expanded plan.
+        at: the motors' positions around each of its steps.
+    """
+    transmission = Transmission.of(scene)
+    poses = poses_of(scene.arm, transmission, made, at)
     checks = []
     if scene.obstacles:
-        checks.append(_check_clearance(scene, poses, positions))
+        checks.append(_check_clearance(scene, poses))
     if scene.arm.floor:
-        height = np.minimum.reduce([p[:, 1] for p in positions[1:]]) - poses.reach_cm
+        height: Floats = poses.positions_cm[:, 1:, 1].min(axis=1) - poses.reach_cm
         worst = int(np.argmin(height))
-        where = _where(poses, positions, worst)
+        where = poses.place(worst)
         checks.append(at_least("height above the floor", height[worst], scene.margin_cm, "cm", where, "arm.floor"))
-    checks.extend(_check_joint_limits(scene, made))
+    checks.extend(_check_joint_limits(scene, transmission, made, at))
+    checks.extend(_check_bends(poses))
+    bound = 0.5 * float(transmission.levers_cm(scene.arm.link_lengths_cm).sum())
     for name, index, wanted, key in (
         ("start", 0, scene.task.start_cm, "start"),
         ("goal", -1, scene.task.goal_cm, "goal"),
     ):
-        tip = positions[-1][index]
-        bound = float(_half_step_cm(scene).sum())
+        tip = poses.positions_cm[index, -1]
         error = float(np.hypot(*(tip - wanted)))
         where = f"tip ({tip[0]:.4f}, {tip[1]:.4f}) cm"
         setting = f"task.{key}_cm or joints.microsteps"
@@ -57,49 +50,22 @@ def check_space(scene: Scene, made: StepTrain) -> list[Check]:
     return checks
 
 
-def _half_step_cm(scene: Scene) -> Floats:
-    """Return how far half a micro-step of each motor can move a point of the arm."""
-    return 0.5 * Transmission.of(scene).levers_cm(scene.arm.link_lengths_cm)
-
-
-def _poses(scene: Scene, made: StepTrain) -> _Poses:
-    """Return the poses of the whole motion in the order of time."""
-    ticks = np.unique(np.concatenate([steps.ticks for steps in made.steps]))
-    half_step_cm = _half_step_cm(scene)
-    middles = np.empty((len(ticks) + 2, len(scene.joints)))
-    reach_cm = np.zeros(len(ticks) + 2)
-    for j, (steps, start) in enumerate(zip(made.steps, made.start_usteps, strict=True)):
-        positions = np.concatenate([[start], start + np.cumsum(steps.directions, dtype=np.int64)])
-        before = positions[np.searchsorted(steps.ticks, ticks, side="left")]
-        after = positions[np.searchsorted(steps.ticks, ticks, side="right")]
-        middles[:, j] = np.concatenate([[start], 0.5 * (before + after), positions[-1:]])
-        reach_cm[1:-1] += np.abs(after - before) * half_step_cm[j]
-    q_rad = Transmission.of(scene).q_rad(middles)
-    return _Poses(np.concatenate([[0], ticks, [made.duration_ticks]]), q_rad, reach_cm)
-
-
-def _check_clearance(scene: Scene, poses: _Poses, positions: list[Floats]) -> Check:
-    """Check the least distance of any link's centre line from any obstacle."""
-    least, nearest = np.full(len(poses.ticks), np.inf), np.zeros(len(poses.ticks), np.int64)
-    for number, obstacle in enumerate(scene.obstacles, start=1):
-        shape = shape_of(obstacle)
-        for a, b in pairwise(positions):
-            distance = link_clearance_cm(a, b, shape)
-            nearest = np.where(distance < least, number, nearest)
-            least = np.minimum(least, distance)
-    least = least - poses.reach_cm
+def _check_clearance(scene: Scene, poses: Poses) -> Check:
+    """Check the least distance of any link's centre line from any obstacle, at and between all micro-steps."""
+    obstacles = obstacle_set([shape_of(obstacle) for obstacle in scene.obstacles])
+    distances, nearest = clearances_cm(poses.positions_cm, obstacles)
+    least = distances - poses.reach_cm
     worst = int(np.argmin(least))
-    where = f"{_where(poses, positions, worst)}, obstacles[{nearest[worst]}]"
+    where = f"{poses.place(worst)}, obstacles[{nearest[worst] + 1}]"
     setting = "workspace.clearance_cm or planner.moves"
     return at_least("clearance of the links' centre lines", least[worst], scene.margin_cm, "cm", where, setting)
 
 
-def _check_joint_limits(scene: Scene, made: StepTrain) -> list[Check]:
+def _check_joint_limits(scene: Scene, transmission: Transmission, made: StepTrain, at: MotorPositions) -> list[Check]:
     """Check every pose against the joint limits; within half a micro-step beyond a limit is amber: it is rounding."""
     checks = []
-    transmission = Transmission.of(scene)
-    ticks = np.unique(np.concatenate([[0], *(steps.ticks for steps in made.steps)]))
-    q_rad = transmission.q_rad(np.column_stack([_positions_after(made, m, ticks) for m in range(len(scene.joints))]))
+    ticks = np.concatenate([[0], at.ticks])
+    q_rad = transmission.q_rad(np.concatenate([[made.start_usteps], at.after_usteps]))
     for number, (low, high) in enumerate(scene.arm.joint_limits_rad, start=1):
         angles = q_rad[:, number - 1]
         room = np.minimum(angles - low, high - angles)
@@ -113,13 +79,19 @@ def _check_joint_limits(scene: Scene, made: StepTrain) -> list[Check]:
     return checks
 
 
-def _positions_after(made: StepTrain, m: int, ticks: Ticks) -> Ticks:
-    """Return where motor m, from 0, stands after its steps up to each tick."""
-    steps, start = made.steps[m], made.start_usteps[m]
-    positions: Ticks = np.concatenate([[start], start + np.cumsum(steps.directions, dtype=np.int64)])
-    return positions[np.searchsorted(steps.ticks, ticks, side="right")]
+def _check_bends(poses: Poses) -> list[Check]:
+    """Tell how near each inner joint comes to a singular pose, straight or folded; never red: no limit breaks there.
 
-
-def _where(poses: _Poses, positions: list[Floats], i: int) -> str:
-    x, y = positions[-1][i]
-    return f"{poses.ticks[i] / TICKS_HZ:.6f} s, tip ({x:.2f}, {y:.2f}) cm"
+    Speeds and step rates grow without bound near such a pose, but they are checked themselves.
+    """
+    checks = []
+    for number in range(2, poses.q_rad.shape[1] + 1):
+        folded = np.abs(np.remainder(poses.q_rad[:, number - 1], np.pi))
+        bend = np.minimum(folded, np.pi - folded)
+        worst = int(np.argmin(bend))
+        verdict: Verdict = "green" if bend[worst] >= AMBER_BEND_RAD else "amber"
+        where = f"{poses.place(worst)}, joint {number} at {np.degrees(poses.q_rad[worst, number - 1]):.2f} deg"
+        setting = f"arm.joint_limits_deg[{number}]"
+        name = f"joint {number} distance to a singular pose"
+        checks.append(Check(name, float(bend[worst]), float(AMBER_BEND_RAD), "rad", verdict, where, setting))
+    return checks

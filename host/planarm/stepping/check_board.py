@@ -1,0 +1,124 @@
+"""Certificate: what the line has to bring and the board has to do, against what they can."""
+
+from bisect import bisect_right
+
+import numpy as np
+
+from planarm.scene import LinkSpec
+from planarm.stepping.certificate import Check, at_least, at_most
+from planarm.stepping.table import SegmentTable, segment_bytes
+from planarm.stepping.train import Floats, StepTrain, Ticks
+from planarm_wire.messages import (
+    CRC_BYTES,
+    HEADER_BYTES,
+    HOST_WINDOW_BYTES,
+    QUEUE_SLOTS,
+    TICKS_HZ,
+)
+
+BITS_PER_BYTE = 10
+"""On the line: start bit, eight bits, stop bit."""
+
+STEP_INTERRUPT_TICKS = 104
+LINE_LOAD = 0.1
+READ_TICKS = 15_000
+LATEST_READ_TICKS = 20_000
+LEAST_SHARE = 0.05
+"""What the board takes, measured on the emulator (firmware/README.md, budgets): a step's interrupt; the share of the
+line's interrupts; the main program's work on a segment, from the rates at which it just keeps up (12,000 to 15,000);
+and how long before its start a segment must be there. The last keeps an overloaded board's time finite."""
+
+LOAD_WINDOW_TICKS = 80_000
+MOST_LOAD = 0.75
+AMBER_LOAD = 0.6
+"""Share of the processor that interrupts may take in any 5 ms; the rest is the main program's, which prepares steps."""
+
+LINE_WINDOW_S = 0.25
+AMBER_LINE_SHARE = 0.4
+"""Peak share of the line over any quarter of a second; above it a lost frame is hard to make good in time."""
+
+FLUSH_S = 0.0041
+"""The Uno's USB bridge (ATmega16U2) keeps a reply for up to 4.1 ms."""
+REPLY_BYTES = 40
+
+
+def check_board(table: SegmentTable, made: StepTrain, link: LinkSpec) -> list[Check]:
+    """Check the interrupt load, the line's peak, and that segments come and are read in time."""
+    if not len(table.durations):
+        return []
+    return [_check_load(made), _check_peak(table, link), *_check_supply(table, link)]
+
+
+def _check_load(made: StepTrain) -> Check:
+    """Check the share of the processor that interrupts take in every 5 ms, a busy line included."""
+    ticks = np.sort(np.concatenate([steps.ticks for steps in made.steps]))
+    within = np.searchsorted(ticks, ticks + LOAD_WINDOW_TICKS, side="left") - np.arange(len(ticks))
+    most = int(within.max()) if len(ticks) else 0
+    load = LINE_LOAD + STEP_INTERRUPT_TICKS * most / LOAD_WINDOW_TICKS
+    where = _time(int(ticks[within.argmax()])) if len(ticks) else ""
+    setting = "joints.microsteps or joints.max_speed_deg_s"
+    return at_most("interrupt load in any 5 ms", load, MOST_LOAD, "", where, setting, amber=AMBER_LOAD)
+
+
+def _frame_bytes(table: SegmentTable) -> Floats:
+    """Return each segment's bytes on the line, with its share of a frame: two segments a frame, as a rule."""
+    return np.asarray(segment_bytes(table), np.float64) + 0.5 * (HEADER_BYTES + 2 * CRC_BYTES + 1)
+
+
+def _check_peak(table: SegmentTable, link: LinkSpec) -> Check:
+    """Check the largest share of the line in any LINE_WINDOW_S.
+
+    What can be sent is less than the line's rate: at most HOST_WINDOW_BYTES are on their way until a reply has come
+    back, and that takes their own time, the bridge's flush and the reply's time.
+    """
+    line_bytes_s = link.baud / BITS_PER_BYTE
+    turn_s = (HOST_WINDOW_BYTES + REPLY_BYTES) / line_bytes_s + FLUSH_S
+    budget = HOST_WINDOW_BYTES / turn_s / line_bytes_s
+    starts, total = table.starts[:-1], np.concatenate([[0.0], np.cumsum(_frame_bytes(table))])
+    until = np.searchsorted(starts, starts + int(LINE_WINDOW_S * TICKS_HZ), side="left")
+    sent: Floats = total[until] - total[np.arange(len(starts))]
+    worst = int(sent.argmax())
+    share = float(sent[worst]) / LINE_WINDOW_S / line_bytes_s
+    where = _time(int(starts[worst]))
+    setting = "link.baud or joints.microsteps"
+    amber = min(AMBER_LINE_SHARE, budget)
+    return at_most("peak share of the line", share, budget, "", where, setting, amber=amber)
+
+
+def _check_supply(table: SegmentTable, link: LinkSpec) -> list[Check]:
+    """Check that the line brings every segment before it starts, and the board reads it.
+
+    The device holds QUEUE_SLOTS segments, so a segment is sent when the one that many before it has ended. Its main
+    program reads them one by one in the time that the interrupts of the running segment leave.
+    """
+    starts: list[int] = table.starts.tolist()
+    line_ticks = (_frame_bytes(table) * BITS_PER_BYTE * TICKS_HZ / link.baud).tolist()
+    loads: list[float] = _interrupt_loads(table).tolist()
+    line_tick = board_tick = 0.0
+    line, board = [(float(starts[-1]), 0)], [(float(starts[-1]), 0)]
+    for k in range(QUEUE_SLOTS, len(line_ticks)):  # the others are sent before the start
+        line_tick = max(line_tick, float(starts[k - QUEUE_SLOTS + 1])) + line_ticks[k]
+        board_tick = max(board_tick, line_tick)
+        running = min(k, bisect_right(starts, board_tick) - 1)
+        board_tick += READ_TICKS / max(1.0 - loads[running], LEAST_SHARE)
+        line.append((starts[k] - line_tick, k))
+        board.append((starts[k] - board_tick - LATEST_READ_TICKS, k))
+    checks = []
+    for name, found, setting in (
+        ("time ahead of the line", line, "link.baud or joints.microsteps"),
+        ("time ahead of the board", board, "joints.microsteps or joints.max_speed_deg_s"),
+    ):
+        ahead_ticks, k = min(found)
+        where = f"segment {k}, {_time(starts[k])}" if len(found) > 1 else ""
+        checks.append(at_least(name, ahead_ticks / TICKS_HZ, 0.0, "s", where, setting))
+    return checks
+
+
+def _interrupt_loads(table: SegmentTable) -> Floats:
+    """Return the share of the processor that interrupts take while each segment runs and the line is busy."""
+    steps: Ticks = table.counts.sum(axis=1)
+    return LINE_LOAD + STEP_INTERRUPT_TICKS * steps / np.maximum(table.durations, 1)
+
+
+def _time(tick: int) -> str:
+    return f"{tick / TICKS_HZ:.6f} s"

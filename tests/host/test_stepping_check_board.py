@@ -1,0 +1,72 @@
+"""The certificate's checks of the line and the board, each on the smallest plan that can break it."""
+
+import pytest
+
+from planarm.scene import LinkSpec
+from planarm.stepping.check_board import check_board
+from planarm.stepping.expand import expand
+from planarm.stepping.table import table_of
+from planarm_wire.messages import BAUD, Move
+from segment_plans import REST, plan_of, verdict_of
+
+LINK = LinkSpec("sim://", BAUD)
+
+
+def checks_of(plan, link=LINK):
+    return check_board(table_of(plan), expand(plan), link)
+
+
+@pytest.mark.parametrize("slower", [True, False])
+def test_segments_must_not_be_shorter_than_the_line_takes_to_bring_them(slower):
+    # A segment of one step of one joint: duration (2 or 3 bytes), steps, first (2 bytes), 0: 6 or 7 bytes, and half a
+    # frame, shared with another: 3 of header, two checks of 2, delimiter. 10 bits a byte at 250,000 baud, 16 MHz.
+    frame_bytes = 7 + (3 + 2 * 2 + 1) // 2
+    ticks = frame_bytes * 10 * 16_000_000 // BAUD
+    duration = ticks + 200 if slower else ticks - 1000
+    checks = checks_of(plan_of(*[(duration, Move(3, 1000), REST)] * 2000))
+    assert verdict_of(checks, "ahead of the line") == ("green" if slower else "red")
+
+
+@pytest.mark.parametrize(
+    ("interval_ticks", "segments_hz", "verdict"),
+    [
+        (320, 333, "red"),  # the rate at which the board only just keeps up with both joints at 50 k steps/s
+        (320, 250, "green"),
+        (800, 800, "red"),  # the same at 20 k
+        (800, 600, "green"),
+        (8_000, 900, "green"),
+    ],
+)
+def test_the_board_needs_time_to_read_segments(interval_ticks, segments_hz, verdict):
+    """firmware/README.md: sustained segments a second fall with the step rate; the check keeps below them."""
+    duration = 16_000_000 // segments_hz
+    move = Move(2 * (duration // interval_ticks) + 1, 0, interval_ticks << 16)
+    checks = checks_of(plan_of(*[(duration, move, move)] * 2000))
+    assert verdict_of(checks, "ahead of the board") == verdict
+
+
+def test_a_burst_of_short_segments_cannot_be_sent_before_there_is_room():
+    # The line is idle for seconds, but the device holds 32 segments and no more.
+    long, short = (10**6, Move(3, 1000), REST), (4000, Move(3, 1000), REST)
+    assert verdict_of(checks_of(plan_of(*[long] * 40, *[short] * 31)), "ahead of the line") == "green"
+    assert verdict_of(checks_of(plan_of(*[long] * 40, *[short] * 100)), "ahead of the line") == "red"
+
+
+@pytest.mark.parametrize(("steps", "verdict"), [(480, "green"), (505, "red"), (400, "amber")])
+def test_interrupts_leave_a_quarter_of_every_5_ms(steps, verdict):
+    """104 cycles a step and a tenth for the line: 500 steps in 80,000 ticks are 0.75, 385 are 0.6."""
+    interval = 80_000 // (steps // 2)
+    move = Move(2 * (steps // 2) + 1, 0, interval << 16)
+    plan = plan_of((80_000, move, move), (400_000, REST, REST))
+    check = next(check for check in checks_of(plan) if "load" in check.name)
+    assert check.value == pytest.approx(0.1 + 104 * steps / 80_000, abs=0.005)
+    assert check.verdict == ("amber" if verdict == "green" else verdict)
+
+
+@pytest.mark.parametrize(("segments_hz", "verdict"), [(300, "green"), (950, "amber"), (1700, "red")])
+def test_the_peak_of_the_line_leaves_room_for_lost_frames(segments_hz, verdict):
+    """Seven bytes and half a frame's eight are 11 a segment; the line brings 25,000 a second, with replies 11,000."""
+    plan = plan_of(*[(16_000_000 // segments_hz, Move(3, 1000), REST)] * 2000)
+    check = next(check for check in checks_of(plan) if "peak" in check.name)
+    assert check.verdict == verdict
+    assert check.value == pytest.approx(11 * segments_hz / 25_000, rel=0.1)
