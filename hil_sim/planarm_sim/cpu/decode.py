@@ -16,20 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from planarm_sim.cpu import opcodes as op
-from planarm_sim.cpu.layout import CONSTANTS, TEMP
-from planarm_sim.cpu.registers import (
-    GPIOR0,
-    GPIOR1,
-    GPIOR2,
-    ICR1H,
-    IO_START,
-    OCR1AH,
-    OCR1BH,
-    READS_PLAIN,
-    SRAM_START,
-    SREG,
-    TCNT1H,
-)
+from planarm_sim.cpu.layout import CONSTANTS
+from planarm_sim.cpu.registers import IO_START, READS_PLAIN, SRAM_START, SREG
+from planarm_sim.cpu.tables import WRITES_WORD
 
 FLASH_BYTES = 32 * 1024
 FLASH_WORDS = FLASH_BYTES // 2
@@ -137,12 +126,6 @@ _ON_PLAIN_READS = {op.IN: op.MOV, op.SBIC: op.SBRC, op.SBIS: op.SBRS, op.LDS: op
 """What to do instead with an I/O register that always reads as last written: it is one more register."""
 _ON_PLAIN_WRITES = {op.OUT: op.MOV, op.STS: op.STS_PLAIN}
 _SREG_FORMS = {op.IN: op.IN_SREG, op.OUT: op.OUT_SREG}
-# The word of the state that a data address writes and nothing else, or -1: general registers, GPIORn, and the high
-# bytes of timer 1's registers, which wait in TEMP.
-_WRITES_WORD = np.full(0x10000, -1, dtype=np.int64)
-_WRITES_WORD[:32] = np.arange(32)
-_WRITES_WORD[[GPIOR0, GPIOR1, GPIOR2]] = (GPIOR0, GPIOR1, GPIOR2)
-_WRITES_WORD[[TCNT1H, ICR1H, OCR1AH, OCR1BH]] = TEMP
 
 
 @dataclass(frozen=True, slots=True)
@@ -256,7 +239,7 @@ def _specialised(operation: int, d: _Words, r: _Words, k: _Words) -> tuple[_Word
         plain[plain] = READS_PLAIN[address[plain]]
         result[plain] = _ON_PLAIN_READS[operation]
     if operation in _ON_PLAIN_WRITES:
-        word = _WRITES_WORD[address]
+        word = np.where(address < SRAM_START, WRITES_WORD[address % SRAM_START], -1)
         plain = word >= 0
         result[plain] = _ON_PLAIN_WRITES[operation]
         d, k = (np.where(plain, word, d), k) if operation == op.OUT else (d, np.where(plain, word, k))

@@ -28,12 +28,14 @@ from planarm_sim.cpu.layout import (
     SOMETHING_CHANGED,
     SP,
     SREG_BITS,
+    STORES,
     WATCHED,
     Bytes,
     State,
 )
-from planarm_sim.cpu.registers import SRAM_END, SRAM_START
+from planarm_sim.cpu.registers import READS_PLAIN, SRAM_END, SRAM_START
 from planarm_sim.cpu.service import AT_BAD_OPCODE, AT_BREAK, FLASH_WRITE, RUNNING, look_up
+from planarm_sim.cpu.tables import WRITES_WORD
 
 PC_MASK = 0x3FFF
 CODE_MASK = 0x7FFF
@@ -188,6 +190,8 @@ def run(st: State, memory: Bytes, words: State, code: State, flash: Bytes, targe
             offset = address - SRAM_START
             if 0 <= offset < SRAM_BYTES:
                 st[(word >> 8) & 0xFF] = memory[offset]
+            elif offset < 0 and READS_PLAIN[address & 0xFF]:
+                st[(word >> 8) & 0xFF] = st[address & 0xFF]
             else:
                 note_access(st, io.READ, address, (word >> 8) & 0xFF, pc - 1)
             cycle += 1
@@ -198,6 +202,9 @@ def run(st: State, memory: Bytes, words: State, code: State, flash: Bytes, targe
             offset = address - SRAM_START
             if 0 <= offset < SRAM_BYTES:
                 memory[offset] = value
+                st[STORES] += 1
+            elif offset < 0 and WRITES_WORD[address & 0xFF] >= 0:
+                st[WRITES_WORD[address & 0xFF]] = value
             else:
                 note_access(st, io.WRITE, address, value, pc - 1)
             cycle += 1
@@ -221,6 +228,7 @@ def run(st: State, memory: Bytes, words: State, code: State, flash: Bytes, targe
             offset = address - SRAM_START
             if 0 <= offset < SRAM_BYTES:
                 memory[offset] = value
+                st[STORES] += 1
             else:
                 note_access(st, io.WRITE, address, value, pc - 1)
             cycle += 1
@@ -239,6 +247,7 @@ def run(st: State, memory: Bytes, words: State, code: State, flash: Bytes, targe
             offset = address - SRAM_START
             if 0 <= offset < SRAM_BYTES:
                 memory[offset] = value
+                st[STORES] += 1
             else:
                 note_access(st, io.WRITE, address, value, pc - 1)
             pc += 1
@@ -267,6 +276,7 @@ def run(st: State, memory: Bytes, words: State, code: State, flash: Bytes, targe
             offset = address - SRAM_START
             if 0 <= offset < SRAM_BYTES:
                 memory[offset] = value
+                st[STORES] += 1
             else:
                 note_access(st, io.WRITE, address, value, pc - 1)
             cycle += 1
@@ -317,6 +327,7 @@ def run(st: State, memory: Bytes, words: State, code: State, flash: Bytes, targe
                 memory[place + 1] = pc & 0xFF
                 memory[place] = pc >> 8
                 st[SP] -= 2
+                st[STORES] += 1
             else:
                 note_access(st, io.CALL, pc, pc, pc - 1)
             pc = word >> 32
@@ -327,6 +338,7 @@ def run(st: State, memory: Bytes, words: State, code: State, flash: Bytes, targe
                 memory[place + 1] = (pc + 1) & 0xFF
                 memory[place] = (pc + 1) >> 8
                 st[SP] -= 2
+                st[STORES] += 1
             else:
                 note_access(st, io.CALL, pc, pc + 1, pc - 1)
             pc = word >> 32
@@ -467,6 +479,7 @@ def run(st: State, memory: Bytes, words: State, code: State, flash: Bytes, targe
             offset = address - SRAM_START
             if 0 <= offset < SRAM_BYTES:
                 memory[offset] = value
+                st[STORES] += 1
             else:
                 note_access(st, io.WRITE, address, value, pc - 1)
             cycle += 1
@@ -485,6 +498,7 @@ def run(st: State, memory: Bytes, words: State, code: State, flash: Bytes, targe
                 memory[place + 1] = pc & 0xFF
                 memory[place] = pc >> 8
                 st[SP] -= 2
+                st[STORES] += 1
             else:
                 note_access(st, io.CALL, pc, pc, pc - 1)
             pc = (st[Z_LOW] | (st[Z_HIGH] << 8)) & PC_MASK

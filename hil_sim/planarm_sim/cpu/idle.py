@@ -23,6 +23,7 @@ from planarm_sim.cpu.layout import (
     PASSED_OVER,
     SP,
     SREG_BITS,
+    STORES,
     TEMP,
     WATCH_CYCLE,
     WATCH_NEXT,
@@ -32,6 +33,7 @@ from planarm_sim.cpu.layout import (
     WATCH_SAW,
     WATCH_SRAM,
     WATCH_STAMP,
+    WATCH_STORES,
     WATCH_TURNS,
     WATCHED,
     State,
@@ -86,7 +88,7 @@ def pass_over(st: State, words: State) -> None:
         elif st[WATCH_TURNS] == st[WATCH_NEXT]:
             st[WATCH_NEXT] *= 2
             record(st)
-    elif st[WATCH_SRAM] and same_contents(st, words):
+    elif st[WATCH_STORES] == st[STORES] or (st[WATCH_SRAM] and same_contents(st, words)):
         st[WATCH_PENALTY] = 0
         turn = cycle - st[WATCH_CYCLE]
         st[CYCLE] += room // turn * turn
@@ -95,13 +97,14 @@ def pass_over(st: State, words: State) -> None:
         give_up(st)
     else:
         st[WATCH_SRAM] = 1
+        st[WATCH_STORES] = st[STORES]
         st[WATCH_CYCLE] = cycle
         st[WATCH_NEXT] = 2 * st[WATCH_TURNS] + 2
         for n in range(SRAM_WORDS):
             st[KEPT_SRAM + n] = words[n]
 
 
-@kernel
+@inlined
 def record(st: State) -> None:
     """Keep the words that a turn must leave as they are; the SRAM only once they agree."""
     for n in range(REGISTERS):
@@ -109,10 +112,11 @@ def record(st: State) -> None:
     for n in range(len(OTHERS)):
         st[WATCH_RECORD + REGISTERS + n] = st[OTHERS[n]]
     st[WATCH_CYCLE] = st[CYCLE]
+    st[WATCH_STORES] = st[STORES]
     st[WATCH_SRAM] = 0
 
 
-@kernel
+@inlined
 def same_words(st: State) -> bool:
     """Tell whether all recorded words are as they were."""
     different = 0
@@ -123,7 +127,7 @@ def same_words(st: State) -> bool:
     return bool(different == 0)
 
 
-@kernel
+@inlined
 def same_contents(st: State, words: State) -> bool:
     """Tell whether the SRAM is as it was."""
     different = 0

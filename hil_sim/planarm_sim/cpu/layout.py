@@ -213,6 +213,7 @@ SHIFT_FLAGS = CARRY_FLAGS + 512
 # --- The loop that is watched (see `idle`); nothing that decides the run, so no snapshot has it --------------
 (
     CHANGES,  # counts what could make one turn of a loop differ from the next, beside what is compared
+    STORES,  # counts writes to the SRAM
     LAST_BACK,  # where the program last jumped back to
     WATCHED,  # head of the loop that is watched, or -1
     WATCH_SAW,  # 1 once the program came by there since the CPU loop last looked up
@@ -222,10 +223,11 @@ SHIFT_FLAGS = CARRY_FLAGS + 512
     WATCH_TURNS,
     WATCH_NEXT,  # turns after which the record is made anew
     WATCH_CYCLE,  # cycle of the record
+    WATCH_STORES,  # STORES then
     WATCH_SRAM,  # 1 when the SRAM is part of the record
     PASSED_OVER,  # cycles, in all
     WATCH_RECORD,  # 38 words
-) = range(SHIFT_FLAGS + 512, SHIFT_FLAGS + 512 + 13)
+) = range(SHIFT_FLAGS + 512, SHIFT_FLAGS + 512 + 15)
 KEPT_SRAM = WATCH_RECORD + 38
 """256 words: the SRAM as it was."""
 QUEUES = KEPT_SRAM + 256

@@ -1,4 +1,4 @@
-"""Constants behind the chip's state that the CPU loop looks up: numbers, and what instructions do to SREG.
+"""What the CPU loop looks up: numbers and what instructions do to SREG, behind the chip's state; words of registers.
 
 The flags follow the Boolean formulas of the AVR Instruction Set Manual. Of a sum or a difference of a and b, the
 carries (or borrows) into each bit are `a ^ b ^ total`: bit 4 is H, bit 8 is C, and bits 7 and 8 differ when V is
@@ -13,6 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from planarm_sim.cpu.flags import C, H, N, S, V, Z
+from planarm_sim.cpu.layout import TEMP
+from planarm_sim.cpu.registers import GPIOR0, GPIOR1, GPIOR2, ICR1H, OCR1AH, OCR1BH, TCNT1H
 
 _Flags = NDArray[np.int64]
 
@@ -39,6 +41,13 @@ def shift_flags() -> _Flags:
     flags: _Flags = Z * (result == 0) | N * negative | (C | S) * carry | V * (negative ^ carry)
     return flags
 
+
+WRITES_WORD = np.full(256, -1, dtype=np.int64)
+"""The word of the state that a data address writes and nothing else, or -1: general registers, GPIORn, and the high
+bytes of timer 1's registers, which wait in TEMP."""
+WRITES_WORD[:32] = np.arange(32)
+WRITES_WORD[[GPIOR0, GPIOR1, GPIOR2]] = (GPIOR0, GPIOR1, GPIOR2)
+WRITES_WORD[[TCNT1H, ICR1H, OCR1AH, OCR1BH]] = TEMP
 
 CONSTANT_WORDS: Final = np.concatenate((np.arange(256), result_flags(), carry_flags(), shift_flags()))
 """What stands at `layout.CONSTANTS` and behind it."""

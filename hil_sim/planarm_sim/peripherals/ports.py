@@ -7,7 +7,7 @@ seen by an IN only with one instruction between them).
 
 from __future__ import annotations
 
-from planarm_sim.cpu.compiled import constant, kernel  # kernel_cache: see there
+from planarm_sim.cpu.compiled import constant, inlined, kernel  # kernel_cache: see there
 from planarm_sim.cpu.layout import (
     CHANGED_AT,
     CHANGES,
@@ -152,7 +152,7 @@ def schedule_capture(st: State, level: int, cycle: int) -> None:
         st[DUE_CAPTURE] = NEVER
 
 
-@kernel
+@inlined
 def read_pins(st: State, port: int, cycle: int) -> int:
     """PINx as the CPU reads it in the clock cycle that begins at `cycle`: the levels one cycle before."""
     if st[CHANGED_AT + port] >= cycle:
@@ -161,7 +161,7 @@ def read_pins(st: State, port: int, cycle: int) -> int:
     return int(st[LEVEL + port])
 
 
-@kernel
+@inlined
 def write_port(st: State, address: int, value: int, cycle: int) -> None:
     """Write PINx (toggles), DDRx or PORTx; takes effect at `cycle`, the end of the instruction."""
     port = (address - PINB) // 3

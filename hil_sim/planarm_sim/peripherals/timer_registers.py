@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from planarm_sim.cpu.compiled import kernel  # kernel_cache: see there
+from planarm_sim.cpu.compiled import inlined, kernel  # kernel_cache: see there
 from planarm_sim.cpu.layout import (
     AT_BOTTOM,
     AT_MAX,
@@ -193,7 +193,7 @@ def read_count8(st: State, t: int, cycle: int) -> int:
     return int(st[t + F_COUNT])
 
 
-@kernel
+@inlined
 def write_timer1(st: State, address: int, value: int, cycle: int) -> None:
     """Write a register of timer 1; the high bytes wait in TEMP."""
     if address in (TCNT1H, ICR1H, OCR1AH, OCR1BH):
@@ -220,7 +220,7 @@ def write_timer1(st: State, address: int, value: int, cycle: int) -> None:
     plan_timer(st, TIMER1)
 
 
-@kernel
+@inlined
 def read_timer1(st: State, address: int, cycle: int) -> int:
     """Read TCNT1 or ICR1: the low byte puts the high one into TEMP; OCR1x read as written, TEMP aside."""
     word = st[TIMER1 + F_ICR]

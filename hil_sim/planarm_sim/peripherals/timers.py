@@ -8,7 +8,7 @@ and the pin one timer clock after TCNT = OCRnx (figures 15-10, 15-11, 16-10), TO
 
 from __future__ import annotations
 
-from planarm_sim.cpu.compiled import kernel  # kernel_cache: see there
+from planarm_sim.cpu.compiled import inlined, kernel  # kernel_cache: see there
 from planarm_sim.cpu.layout import (
     AT_BOTTOM,
     AT_MAX,
@@ -55,7 +55,7 @@ TOV, OCF_A, OCF_B, ICF = 1 << 0, 1 << 1, 1 << 2, 1 << 5  # bits of TIFRn, and of
 COM_TOGGLE, COM_CLEAR, COM_SET = 1, 2, 3
 
 
-@kernel
+@inlined
 def timer_top(st: State, t: int) -> int:
     """TOP of the timer at block `t`."""
     source = st[t + F_TOP_SOURCE]
@@ -66,20 +66,20 @@ def timer_top(st: State, t: int) -> int:
     return int(st[t + F_TOP_FIXED])
 
 
-@kernel
+@inlined
 def clock_phase(st: State, t: int) -> int:
     """Number of the last timer clock up to F_SYNC, counted from the reset of the prescaler."""
     return int((st[t + F_SYNC] - st[st[t + F_PRESCALER]]) >> st[t + F_SHIFT])
 
 
-@kernel
+@inlined
 def clock_runs(st: State, t: int) -> bool:
     """Tell whether the timer counts by itself (not stopped, not on a pin, prescaler not held in reset)."""
     shift = st[t + F_SHIFT]
     return bool(shift == 0 or (shift > 0 and st[st[t + F_HELD]] == 0))
 
 
-@kernel
+@inlined
 def clocks_to_event(st: State, t: int, matches: int) -> int:
     """Timer clocks until the one that leaves the end of this leg, or earlier OCRnA/B when in `matches`."""
     count = st[t + F_COUNT]
@@ -163,7 +163,7 @@ def clock_timer(st: State, t: int, cycle: int) -> None:
             drive_output(st, t, channel, matched & (OCF_A << channel), wraps, is_top, is_bottom, cycle)
 
 
-@kernel
+@inlined
 def step_count(st: State, t: int, count: int, is_top: bool) -> bool:
     """Move the counter by one timer clock; tell whether it wrapped to 0."""
     if st[t + F_SLOPE] == SLOPE_DUAL:
@@ -281,7 +281,7 @@ def write_count(st: State, t: int, value: int) -> None:
     st[t + F_BLOCKED] = 1
 
 
-@kernel
+@inlined
 def write_compare(st: State, t: int, channel: int, value: int) -> None:
     """Write OCRnx, at once or into its buffer."""
     st[t + F_BUFFER_A + channel] = value

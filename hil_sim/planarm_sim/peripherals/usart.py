@@ -12,7 +12,7 @@ shift register's place (20.7.4: DOR is set when its start bit is found, so the o
 
 from __future__ import annotations
 
-from planarm_sim.cpu.compiled import constant, kernel  # kernel_cache: see there
+from planarm_sim.cpu.compiled import constant, inlined, kernel  # kernel_cache: see there
 from planarm_sim.cpu.layout import (
     BAUD_ORIGIN,
     BIT_FRACTION,
@@ -120,7 +120,7 @@ def release_transmit_pin(st: State, cycle: int) -> None:
     set_override(st, TXD_PIN, False, True, cycle)
 
 
-@kernel
+@inlined
 def write_data(st: State, value: int, cycle: int) -> None:
     """Write UDR0; ignored while UDRE0 is clear or the transmitter is off (datasheet, 20.11.1)."""
     if st[UCSR0B] & TXEN == 0 or st[UCSR0A] & UDRE == 0:
@@ -136,7 +136,7 @@ def write_data(st: State, value: int, cycle: int) -> None:
 # --- Receiver ------------------------------------------------------------------------------------------------
 
 
-@kernel
+@inlined
 def line_level(st: State, cycle: int) -> int:
     """Level that the far end puts on RXD at `cycle`; idle is 1."""
     for index in range(st[RX_HEAD], st[RX_TAIL]):
@@ -205,7 +205,7 @@ def receive_event(st: State, cycle: int) -> None:
     st[HORIZON] = min(st[HORIZON], st[DUE_RX])
 
 
-@kernel
+@inlined
 def majority(st: State, first: int, offset: int, period: int) -> int:
     """Level of a bit as the majority of three samples, the middle one `offset` after sample 1 of the frame."""
     middle = first + offset
@@ -294,7 +294,7 @@ def update_receive_flags(st: State) -> None:
     st[UCSR0B] = (st[UCSR0B] & ~RXB8) | ninth
 
 
-@kernel
+@inlined
 def read_data(st: State) -> int:
     """Read UDR0: the oldest byte of the buffer, or the last one again when the buffer is empty."""
     if st[RX_COUNT]:
