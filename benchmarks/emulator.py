@@ -2,7 +2,9 @@
 
 Times real time are emulated seconds for each second of CPU time in this one process, since the machine may be busy.
 "streaming" plays the bytes that a host sent for a whole plan, at the cycle at which it sent them, so that the host's
-own work is not counted; "with the host" is the same plan streamed by the host in this process.
+own work is not counted; "with the host" is the same plan streamed by the host in this process. The interrupt-heavy
+image is compiled from emulator_parts/interrupt_heavy.c; simavr runs it in the same run, fed the same bytes. Its main
+program waits between bytes, which planarm_sim passes over; the image that "never waits" computes there instead.
 """
 
 import argparse
@@ -15,6 +17,8 @@ from pathlib import Path
 from statistics import median
 from time import perf_counter, process_time
 
+from emulator_parts.fault_runs import cores, runs_per_minute
+from emulator_parts.heavy import MissingToolError, build_driver, build_image, ours_cpu_s, simavr_cpu_s
 from rich import box
 from rich.console import Console
 from rich.table import Table
@@ -30,6 +34,8 @@ REST_S = 2.0
 """Emulated seconds at rest for one measurement."""
 RUNS = 5
 SNAPSHOTS = 300
+HEAVY_S = 2.0
+FAULT_RUNS = 200
 START = "from planarm_sim import Uno; import sys; Uno.from_hex(sys.argv[1]).run(seconds=0.01)"
 """What a program does first."""
 
@@ -41,7 +47,13 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else "")
     parser.add_argument("--cold", action="store_true", help="also time a start that compiles every kernel (a minute)")
     options = parser.parse_args()
-    rows = [at_rest(), *streaming(), *snapshots(), start("warm start", None)]
+    rows = [at_rest(), *streaming()]
+    with tempfile.TemporaryDirectory() as folder:
+        try:
+            rows += [*interrupt_heavy(Path(folder)), *fault_runs(Path(folder))]
+        except MissingToolError as missing:
+            rows.append(("interrupt-heavy image", "-", str(missing)))
+    rows += [*snapshots(), start("warm start", None)]
     if options.cold:
         with tempfile.TemporaryDirectory() as empty:
             rows.append(start("cold start, compiling", empty))
@@ -79,6 +91,33 @@ def streaming() -> list[Cells]:
         ),
         ("streaming, with the host", f"{with_host:.1f} x real time", f"{len(segments)} segments, one run"),
     ]
+
+
+def interrupt_heavy(folder: Path) -> list[Cells]:
+    """Run the interrupt-heavy image on planarm_sim and on simavr, turn by turn."""
+    driver = build_driver(folder)
+    rows: list[Cells] = []
+    for what, busy in (("interrupt-heavy image", False), ("the same, never waits", True)):
+        image = build_image(folder, busy=busy)
+        ours_cpu_s(image, 0.1)
+        pairs = [(ours_cpu_s(image, HEAVY_S), simavr_cpu_s(driver, image, HEAVY_S)) for _ in range(RUNS)]
+        assert all(abs(ours[2] - theirs[2]) <= 2 for ours, theirs in pairs), "the same edges of PB0"
+        ours_s, theirs_s = median(ours[0] for ours, _ in pairs), median(theirs[0] for _, theirs in pairs)
+        ratio = median(theirs[0] / ours[0] for ours, theirs in pairs)
+        rows.append((what, f"{HEAVY_S / ours_s:.1f} x real time", f"median of {RUNS} x {HEAVY_S:g} s"))
+        rows.append(("  beside simavr", f"{ratio:.1f} x simavr", f"simavr: {HEAVY_S / theirs_s:.1f} x real time"))
+    return rows
+
+
+def fault_runs(folder: Path) -> list[Cells]:
+    """Runs of one second with a flipped bit each, on one core and on all."""
+    image = build_image(folder, busy=False)
+    rows = []
+    for processes in sorted({1, min(2, cores())}):
+        speed, ends = runs_per_minute(image, FAULT_RUNS * processes, processes)
+        how = ", ".join(f"{count} {end}" for end, count in sorted(ends.items()))
+        rows.append((f"one-second fault runs, {processes} core{'s' * (processes > 1)}", f"{speed:.0f} a minute", how))
+    return rows
 
 
 class RecordedLine(SimTransport):

@@ -123,8 +123,7 @@ class SerialPort:
         if np.all(frames["bit_cycles"].astype(np.int64) * self._baud == CLOCK_HZ):
             self._received += frames["byte"].astype(np.uint8).tobytes()
         else:
-            for byte, bit_cycles in frames[["byte", "bit_cycles"]].tolist():
-                self._sample(byte, bit_cycles)
+            self._sample(frames["byte"].astype(np.int64), frames["bit_cycles"])
 
     def snapshot(self) -> SerialState:
         """Copy the line's state."""
@@ -170,12 +169,12 @@ class SerialPort:
         """First cycle after the last byte written; exact, so that no rounding adds up over a burst."""
         return self._burst_start - (-self._burst_bytes * FRAME_BITS * CLOCK_HZ // self._baud)
 
-    def _sample(self, byte: int, board_bit_cycles: int) -> None:
-        """Receive one frame as a UART of another rate does, from its start bit on; the line is high after it."""
-        wave = byte << 1 | 0x200  # start bit, eight data bits from the lowest on, stop bit
-        ratio = CLOCK_HZ / self._baud / board_bit_cycles
-        samples = [wave >> min(int((n + 0.5) * ratio), FRAME_BITS - 1) & 1 for n in range(FRAME_BITS)]
-        if samples[0] == 1:
-            return  # the middle of the host's start bit finds the line high again: a spike
-        self._framing_errors += samples[-1] == 0
-        self._received.append(sum(bit << n for n, bit in enumerate(samples[1:-1])))
+    def _sample(self, data: NDArray[Any], board_bit_cycles: NDArray[Any]) -> None:
+        """Receive frames as a UART of another rate does, each from its start bit on; the line is high after it."""
+        waves = data << 1 | 0x200  # start bit, eight data bits from the lowest on, stop bit
+        ratios = CLOCK_HZ / self._baud / board_bit_cycles
+        places = np.minimum(((np.arange(FRAME_BITS) + 0.5) * ratios[:, None]).astype(np.int64), FRAME_BITS - 1)
+        samples = waves[:, None] >> places & 1
+        samples = samples[samples[:, 0] == 0]  # else the middle of the host's start bit finds the line high: a spike
+        self._framing_errors += int(np.count_nonzero(samples[:, -1] == 0))
+        self._received += np.packbits(samples[:, 1:-1].astype(np.uint8), axis=1, bitorder="little").tobytes()

@@ -211,16 +211,9 @@ class Chip:
         causes = 0 if cause == ResetCause.POWER_ON else int(old[reg.MCUSR])
         st = np.zeros_like(old)
         st[at.CONSTANTS :] = old[at.CONSTANTS :]
-        kept = [at.CYCLE, at.TX_BASE, at.TX_COUNT, at.TX_LIMIT, at.EDGE_BASE, at.EDGE_COUNT, at.EDGE_LIMIT]
-        kept += [at.RX_BASE, at.RX_HEAD, at.RX_TAIL, at.IN_BASE, at.IN_HEAD, at.IN_TAIL, at.BOOT_START]
-        kept += [at.WATCH, at.BOOT_RESET, *range(at.ADC_INPUT, at.ADC_INPUT + at.ADC_INPUTS)]
-        kept += [
-            at.WATCH,
-            at.OUTSIDE_ADDRESS,
-            at.OUTSIDE_PC,
-            *range(at.LEVEL, at.PIPE),
-            *range(at.TOUCHED, at.TOUCHED + 256),
-        ]
+        kept = [at.CYCLE, *range(at.TX_COUNT, at.IN_TAIL + 1), at.BOOT_START, at.BOOT_RESET, at.WATCH]
+        kept += [at.OUTSIDE_ADDRESS, at.OUTSIDE_PC, *range(at.LEVEL, at.PIPE), *range(at.TOUCHED, at.TOUCHED + 256)]
+        kept += range(at.ADC_INPUT, at.ADC_INPUT + at.ADC_INPUTS)
         st[kept] = old[kept]
         st[at.OVERRIDE : at.EXTERNAL] = 0
         st[at.DUE : at.DUE + at.DUE_SOURCES] = at.NEVER
@@ -372,9 +365,8 @@ class Chip:
     def snapshot(self) -> Snapshot:
         """Copy everything that decides the further run, logs not yet drained included."""
         st = self._state
-        state = st[: at.STATE_WORDS].copy()
-        entries = queues.contents(st)
-        return Snapshot(state, self._memory.copy(), self._program, entries)
+        entries = queues.contents(st) if queues.in_use(st) else ()
+        return Snapshot(st[: at.STATE_WORDS].copy(), self._memory.copy(), self._program, entries)
 
     def restore(self, snapshot: Snapshot) -> None:
         """Go back to `snapshot`, of this chip or of another with any program; the same run follows."""

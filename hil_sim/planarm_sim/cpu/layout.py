@@ -95,21 +95,15 @@ UNKNOWN = -1
     # --- Input pipeline: what a pin does to peripherals, PIPE_DELAY cycles later ---
     PIPE_HEAD,
     PIPE_COUNT,
-    # --- Queues: first word, used entries, limit in entries ---
-    TX_BASE,
+    # --- Queues: entries in use; the last two are taken from, too ---
     TX_COUNT,
-    TX_LIMIT,
-    EDGE_BASE,
     EDGE_COUNT,
-    EDGE_LIMIT,
-    RX_BASE,
     RX_HEAD,
     RX_TAIL,
-    IN_BASE,
     IN_HEAD,
     IN_TAIL,
     _CPU_END,
-) = range(256, 256 + 73)
+) = range(256, 256 + 67)
 
 # --- When each source of events is due ----------------------------------------------------------------------
 (
@@ -230,7 +224,17 @@ SHIFT_FLAGS = CARRY_FLAGS + 512
 ) = range(SHIFT_FLAGS + 512, SHIFT_FLAGS + 512 + 15)
 KEPT_SRAM = WATCH_RECORD + 38
 """256 words: the SRAM as it was."""
-QUEUES = KEPT_SRAM + 256
+
+# --- Where the queues stand, and how many entries the first two may have ------------------------------------
+(
+    TX_BASE,
+    TX_LIMIT,
+    EDGE_BASE,
+    EDGE_LIMIT,
+    RX_BASE,
+    IN_BASE,
+    QUEUES,  # the first word behind all that
+) = range(KEPT_SRAM + 256, KEPT_SRAM + 256 + 7)
 
 TX_WIDTH, RX_WIDTH = 3, 4
 """Words per entry: sent frames (cycle, data, bit cycles), received ones (start, bit cycles * 2^16, bits, count)."""

@@ -69,17 +69,27 @@ def allocate(state: State, entries: tuple[NDArray[np.int64], ...]) -> State:
     return st
 
 
+def in_use(st: State) -> bool:
+    """Tell whether any queue has entries."""
+    tx, edges, rx_head, rx_tail, in_head, in_tail = st[at.TX_COUNT : at.IN_TAIL + 1].tolist()
+    return bool(tx or edges or rx_tail > rx_head or in_tail > in_head)
+
+
 def refill(st: State, state: State, entries: tuple[NDArray[np.int64], ...]) -> State:
-    """Put `state`'s words and the queues' entries into `st`; returns the array to use, a larger one if need be."""
-    places = [(queue, int(st[queue.base]), int(st[queue.limit]) if queue.limit else 0) for queue in ALL]
-    ends = [base for _, base, _ in places[1:]] + [len(st)]
-    if any(base + len(c) > end for (_, base, _), end, c in zip(places, ends, entries, strict=True)):
+    """Put `state`'s words and the queues' entries into `st`; returns the array to use, a larger one if need be.
+
+    Without `entries`, the queues are empty.
+    """
+    if not entries:
+        st[: len(state)] = state
+        st[at.TX_COUNT : at.IN_TAIL + 1] = 0
+        return st
+    ends = [int(st[queue.base]) for queue in ALL[1:]] + [len(st)]
+    spans = [int(st[queue.base]) + len(content) for queue, content in zip(ALL, entries, strict=True)]
+    if any(span > end for span, end in zip(spans, ends, strict=True)):
         return allocate(np.concatenate((state, st[len(state) : at.QUEUES])), entries)
     st[: len(state)] = state
-    for (queue, base, limit), content in zip(places, entries, strict=True):
-        st[queue.base] = base
-        if queue.limit is not None:
-            st[queue.limit] = limit
+    for queue, content in zip(ALL, entries, strict=True):
         _fill(st, queue, content)
     return st
 
