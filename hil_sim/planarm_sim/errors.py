@@ -10,6 +10,7 @@
     │   ├── StoppedError bad opcode, BREAK, asleep for ever; carries the cause
     │   └── LimitError   what `run_until` waited for did not come
     ├── TraceError       a waveform file that cannot be written or read
+    ├── DefectError      the chip's state contradicts itself: a defect of the emulator, or files of two versions mixed
     └── BridgeError      no pseudo-terminal, or its link cannot be made
 """
 
@@ -17,6 +18,7 @@ from __future__ import annotations
 
 __all__ = [
     "BridgeError",
+    "DefectError",
     "ImageError",
     "LimitError",
     "PinError",
@@ -34,6 +36,10 @@ class SimError(Exception):
 
 class ImageError(SimError):
     """A program file that is damaged, empty, for another chip, or too large."""
+
+
+class DefectError(SimError):
+    """The emulated chip's state contradicts itself, so that its clock would never go on."""
 
 
 class PinError(SimError):

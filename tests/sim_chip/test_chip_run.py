@@ -11,8 +11,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as some
 
+from planarm_sim.cpu import layout as at
 from planarm_sim.cpu.chip import Chip, FirstTouch, StopCause
-from planarm_sim.errors import ImageError
+from planarm_sim.errors import DefectError, ImageError
 from sim_chip.avr_assembler import assemble
 
 # Two compare outputs with interrupts that move them on, an overflow, a serial echo, a pin change, a pin in software.
@@ -245,6 +246,20 @@ def test_modelled_registers_leave_no_note():
     chip = busy_chip()
     chip.run_to(END)
     assert chip.unmodelled() == ()
+
+
+@pytest.mark.parametrize(
+    ("word", "value"), [(at.TIMER1 + at.F_COUNT, 1 << 40), (at.PIPE_COUNT, 1 << 40)], ids=["counter", "pipeline"]
+)
+def test_a_state_that_contradicts_itself_ends_the_run_instead_of_running_for_ever(word, value):
+    # No program brings the chip there: a counter beyond its range, and an input pipeline with no end. Both would have
+    # the events of one instruction never end.
+    chip = Chip(assemble("ldi r16, 1\nsts 0x6F, r16\nsts 0x81, r16\nloop: rjmp loop"))
+    chip.run_to(100)
+    chip._state[word] = value
+    chip._state[at.DUE_PIPE if word == at.PIPE_COUNT else at.DUE_TIMER1] = 150
+    with pytest.raises(DefectError, match="two versions"):
+        chip.run_to(1000)
 
 
 def test_an_image_larger_than_the_flash_is_refused():

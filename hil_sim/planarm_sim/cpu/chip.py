@@ -23,7 +23,7 @@ from planarm_sim.cpu.dispatch import run
 from planarm_sim.cpu.interrupts import note_raised
 from planarm_sim.cpu.program import Program
 from planarm_sim.cpu.service import stand_still
-from planarm_sim.errors import ImageError, PinError, UsageError
+from planarm_sim.errors import DefectError, ImageError, PinError, UsageError
 from planarm_sim.peripherals.adc import NOT_DRIVEN, SUPPLY_UV
 from planarm_sim.peripherals.ports import drive_from_outside, refresh_port
 from planarm_sim.peripherals.self_programming import RWWSB, erase_buffer, execute_spm
@@ -174,10 +174,20 @@ class Chip:
             if cause == service.LOG_FULL:
                 self._state = queues.allocate(self._state, queues.contents(self._state))
             elif cause == service.RESET_WANTED:
-                self.reset(ResetCause(int(self._state[at.RESET_REQUEST])))
+                self._reset_as_asked()
             else:
                 self._program = execute_spm(self._state, self._program)
                 self._look_at_flash()
+
+    def _reset_as_asked(self) -> None:
+        request = int(self._state[at.RESET_REQUEST])
+        if request & at.BROKEN:
+            raise DefectError(
+                f"the chip's state contradicts itself at cycle {self.cycle}, pc 0x{2 * self.pc:04X}: a defect, or "
+                "compiled code of two versions of planarm_sim mixed; empty the folder that PLANARM_CACHE_DIR names "
+                "(or the user's cache folder of planarm), and report it if it comes again"
+            )
+        self.reset(ResetCause(request))
 
     def _advance(self, target: int) -> int:
         """Run, first without the CPU while it stands still; returns one of `service`'s stops."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 from planarm_sim.cpu.compiled import inlined, kernel  # kernel_cache: see there
 from planarm_sim.cpu.interrupts import note_raised, pending_interrupts
 from planarm_sim.cpu.layout import (
+    BROKEN,
     DUE,
     DUE_ADC,
     DUE_CAPTURE,
@@ -22,6 +23,7 @@ from planarm_sim.cpu.layout import (
     IN_HEAD,
     IN_TAIL,
     NEVER,
+    RESET_REQUEST,
     SOMETHING_CHANGED,
     TIMER0,
     TIMER1,
@@ -39,6 +41,9 @@ from planarm_sim.peripherals.timers import advance_timer, plan_timer
 from planarm_sim.peripherals.usart import end_frame, receive_event
 from planarm_sim.peripherals.watchdog import watchdog_timeout
 
+MOST_EVENTS = 1 << 20
+"""Events within one instruction, or one look from outside, that no chip can have."""
+
 
 @inlined
 def next_event(st: State) -> int:
@@ -53,7 +58,13 @@ def next_event(st: State) -> int:
 def process_events(st: State, memory: Bytes, until: int) -> int:
     """Let happen what is due up to and including the cycle `until`; return when the next event is due."""
     due = next_event(st)
+    room = MOST_EVENTS
     while due <= until:
+        room -= 1
+        if room == 0:  # some source does not move on; `Chip` says so
+            st[RESET_REQUEST] |= BROKEN
+            st[HORIZON] = SOMETHING_CHANGED
+            return NEVER
         source = DUE
         while st[source] != due:
             source += 1

@@ -96,7 +96,7 @@ def low_levels(st: State) -> int:
 def lowest_bit(mask: int) -> int:
     """Number of the lowest set bit of a mask that is not 0."""
     number = 0
-    while mask & 1 == 0:
+    while mask & 1 == 0 and number < 63:
         mask >>= 1
         number += 1
     return number

@@ -27,6 +27,8 @@ SOMETHING_CHANGED = 0
 NOTHING_CHANGED = 1
 """Likewise in the past, but nothing that concerns interrupts has happened since the last look."""
 UNKNOWN = -1
+BROKEN = 1 << 16
+"""In RESET_REQUEST: the state contradicts itself, and going on would never end."""
 
 # --- CPU ---------------------------------------------------------------------------------------------------
 (
@@ -39,7 +41,7 @@ UNKNOWN = -1
     IRQ_EARLIEST,  # no interrupt is taken before this cycle (one instruction after SEI and RETI)
     PENDING,  # interrupts with flag and enable set, at least; or UNKNOWN
     ASLEEP,  # 0 awake, else 1 + sleep mode (SM2:0)
-    RESET_REQUEST,  # bits of MCUSR of a reset that a peripheral asks for
+    RESET_REQUEST,  # bits of MCUSR of a reset that a peripheral asks for, or BROKEN
     BOOT_START,  # word address of the boot section, where vectors go when IVSEL is set
     BOOT_RESET,  # 1 when resets lead there (fuse BOOTRST programmed)
     ACCESS,  # what the instruction that just ended wants from I/O, and the particulars (see `access`)

@@ -14,6 +14,7 @@ from planarm_sim.cpu.layout import (
     AT_MAX,
     AT_ONCE,
     AT_TOP,
+    BROKEN,
     F_BLOCKED,
     F_BUFFER_A,
     F_COM_A,
@@ -41,6 +42,7 @@ from planarm_sim.cpu.layout import (
     HORIZON,
     NEVER,
     OVERRIDE,
+    RESET_REQUEST,
     SLOPE_COUNT,
     SLOPE_DUAL,
     SLOPE_FAST,
@@ -116,7 +118,10 @@ def advance_timer(st: State, t: int, cycle: int) -> None:
     last = (cycle - origin) >> shift
     while done < last:
         clocks = clocks_to_event(st, t, OCF_A | OCF_B)
-        if clocks > last - done:
+        if clocks < 1:  # the counter is beyond its range: no write and no clock brings it there
+            st[RESET_REQUEST] |= BROKEN
+            done = last
+        elif clocks > last - done:
             move = last - done
             st[t + F_COUNT] += -move if st[t + F_DOWN] else move
             done = last
