@@ -2,6 +2,7 @@
 
 import pytest
 
+from planarm_sim.cpu import layout as at
 from planarm_sim.cpu.chip import Chip, ResetCause, StopCause
 from planarm_sim.errors import PinError
 from sim_chip.avr_assembler import assemble
@@ -120,10 +121,88 @@ def test_a_reset_keeps_what_is_connected_and_a_snapshot_too():
     assert chip.analog_volts(4) == 1.5
 
 
-def test_other_triggers_are_told_of():
-    chip = Chip(assemble("ldi r16, 3\nsts 0x7B, r16\nbreak"))
+def test_the_comparator_as_a_trigger_is_told_of():
+    chip = Chip(assemble("ldi r16, 1\nsts 0x7B, r16\nbreak"))
     chip.run_to(100)
     assert [touch.register for touch in chip.unmodelled()] == ["ADCSRB"]
+
+
+# Each source's ADTS, what sets its flag at FLAG_AT = 300 cycles or so, and how many cycles after the last write.
+TIMER_START = "ldi r16, {value}\nsts {register}, r16\nldi r16, 1\nsts {clock}, r16\n"
+TRIGGERS = {
+    # OCR0A = 99 counts from the write of TCCR0B on: the flag is set on the timer clock that leaves 99, 100 cycles on.
+    "timer 0 compare A": (3, TIMER_START.format(value=99, register=0x47, clock=0x45), 100),
+    "timer 0 overflow": (4, TIMER_START.format(value=0, register=0x47, clock=0x45), 256),
+    "timer 1 compare B": (5, TIMER_START.format(value=99, register=0x8A, clock=0x81), 100),
+    # TCNT1 = 0xFF00 leaves MAX after 256 clocks.
+    "timer 1 overflow": (
+        6,
+        "ldi r16, 0xFF\nsts 0x85, r16\nldi r16, 0\nsts 0x84, r16\nldi r16, 1\nsts 0x81, r16\n",
+        256,
+    ),
+    # An edge of the pin acts three cycles later: latch, two synchroniser stages, edge detector (17.2).
+    "timer 1 capture": (7, "ldi r16, 0x41\nsts 0x81, r16\n", 200 + 3),
+    "INT0": (2, "ldi r16, 3\nsts 0x69, r16\n", 200 + 3),
+}
+
+
+@pytest.mark.parametrize("name", TRIGGERS)
+def test_a_conversion_is_triggered_when_its_flag_rises(name):
+    # The trigger resets the prescaler and is synchronised for 3 CPU cycles; the sample is taken 2 ADC clocks later and
+    # the result there after 13.5 (24.4, table 24-1), here clocks of 8 cycles. The first conversion since ADEN takes 25
+    # clocks and is done by hand before; the sample is told by a voltage that changes just before or after it.
+    adts, start, after = TRIGGERS[name]
+    control = ADEN | ADATE | 3
+    source = (
+        START.format(mux=AVCC, control=ADEN | ADSC | 3)
+        + DONE.format("first")
+        + f"ldi r16, {adts}\nsts 0x7B, r16\nldi r16, {control | ADIF}\nsts 0x7A, r16\n"
+        + start
+        + "wait: rjmp wait"
+    )
+    probe = Chip(assemble(source))
+    while probe.pc != len(assemble(source)) // 2 - 1:
+        probe.run_to(probe.cycle + 1)
+    started = probe.cycle
+    flag_at = started + after
+    sample, result = flag_at + 3 + 2 * 8, flag_at + 3 + 27 * 8 // 2
+    for changed_at, expected in ((sample - 2, 512), (sample + 1, 0)):
+        chip = Chip(assemble(source))
+        if name in ("timer 1 capture", "INT0"):
+            pin = 8 * 2 + 2 if name == "INT0" else 0
+            chip.drive_pin(pin, 0, 0)
+            chip.drive_pin(pin, 1, started + 200)
+        chip.run_to(changed_at)
+        chip.drive_analog(0, 2.5)
+        chip.run_to(result - 2)
+        assert not chip.snapshot().state[0x7A] & ADIF
+        assert chip.snapshot().state[0x7A] & ADSC
+        chip.run_to(result + 2)
+        assert chip.snapshot().state[0x7A] & (ADIF | ADSC) == ADIF
+        assert chip.snapshot().state[at.ADC_RESULT] == expected
+        assert chip.unmodelled() == ()
+        before = chip.cycle
+        chip.run_to(before + 5000)  # the flag still stands: no edge, no conversion (24.3)
+        assert not chip.snapshot().state[0x7A] & ADSC
+
+
+def test_a_flag_that_is_cleared_triggers_again_and_one_that_comes_too_early_does_not():
+    # Timer 0 in CTC every 256 cycles, its compare interrupt clears the flag. With clocks of 8 cycles a conversion takes
+    # 3 + 108 cycles, so each flag starts one: period 256. With clocks of 32 it takes 3 + 432: every second is ignored.
+    for setting, period in ((3, 256), (5, 512)):
+        control = ADEN | ADATE | ADIE | setting
+        chip = Chip(
+            assemble(
+                "jmp main\n.org 28\nreti\n.org 42\nsbi 0x03, 0\nreti\n.org 60\nmain: sbi 0x04, 0\n"
+                "ldi r16, 255\nout 0x27, r16\nldi r16, 2\nout 0x24, r16\nsts 0x6E, r16\nldi r16, 3\nsts 0x7B, r16\n"
+                f"ldi r16, {control}\nsts 0x7A, r16\nldi r16, 1\nout 0x25, r16\nsei\nloop: rjmp loop"
+            )
+        )
+        chip.run_to(20_000)
+        cycles = chip.drain_edges()["cycle"]
+        steps = cycles[3:] - cycles[2:-1]
+        assert len(steps) > 20
+        assert abs(steps - period).max() <= 2, "up to the two cycles by which an interrupt may wait for an instruction"
 
 
 def test_limits():

@@ -23,6 +23,7 @@ from planarm_sim.cpu.layout import (
     SP,
     SREG_BITS,
     TIMER0,
+    TIMER1,
     TIMER2,
     TOUCHED,
     WATCH,
@@ -60,6 +61,7 @@ from planarm_sim.cpu.registers import (
     PINB,
     PIND,
     PORTD,
+    PRR,
     READS_PLAIN,
     SMCR,
     SPL,
@@ -84,9 +86,10 @@ from planarm_sim.cpu.registers import (
     UDR0,
     WDTCSR,
 )
-from planarm_sim.peripherals.adc import ACME, ADTS, read_adc, write_adc
+from planarm_sim.peripherals.adc import ACME, ADTS, BY_COMPARATOR, read_adc, write_adc
 from planarm_sim.peripherals.eeprom import read_control, write_control
 from planarm_sim.peripherals.ports import PUD, read_pins, refresh_port, write_port
+from planarm_sim.peripherals.power import is_off, write_power_reduction
 from planarm_sim.peripherals.self_programming import BLBSET, SIGRD, write_spm_control
 from planarm_sim.peripherals.timer_registers import (
     read_count8,
@@ -98,6 +101,7 @@ from planarm_sim.peripherals.timer_registers import (
     write_timer_flags,
     write_timer_mask,
 )
+from planarm_sim.peripherals.timers import advance_timer, plan_timer
 from planarm_sim.peripherals.usart import read_data, write_data, write_usart
 from planarm_sim.peripherals.watchdog import write_watchdog
 
@@ -188,6 +192,8 @@ def write_io(st: State, memory: Bytes, address: int, value: int) -> None:
     if SPL <= address <= SREG:
         write_cpu_register(st, address, value)
         return
+    if st[PRR] and is_off(st, address):
+        return
     if PINB <= address <= PORTD:
         write_port(st, address, value, cycle)
     elif TCCR1A <= address <= OCR1BH and address != NO_REGISTER_1:
@@ -254,9 +260,15 @@ def write_rarest_io(st: State, address: int, value: int, cycle: int) -> None:
         if value & (SIGRD | BLBSET):
             touch(st, address)  # signature, fuses and lock bits are not modelled
     elif ADCL <= address <= ADMUX:
+        for t in (TIMER0, TIMER1):  # what they did so far triggers nothing
+            advance_timer(st, t, cycle)
         write_adc(st, address, value, cycle)
-        if address == ADCSRB and value & (ACME | ADTS):
-            touch(st, address)  # of the triggers only free running is modelled
+        for t in (TIMER0, TIMER1):
+            plan_timer(st, t)
+        if address == ADCSRB and (value & ACME or value & ADTS == BY_COMPARATOR):
+            touch(st, address)  # the analogue comparator is not modelled
+    elif address == PRR:
+        write_power_reduction(st, value, cycle)
     else:
         touch(st, address)
         st[address] = value

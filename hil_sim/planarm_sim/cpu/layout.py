@@ -71,6 +71,7 @@ BROKEN = 1 << 16
     ADC_MUX,  # ADMUX as it was then
     ADC_SAMPLE,
     ADC_RESULT,
+    ADC_TRIGGERED,  # 1 when the conversion under way was started by a trigger
     ADC_LOCKED,  # 1 between reads of ADCL and ADCH
     # --- Shared prescalers of the timers ---
     PRESCALER_01,  # cycle of the last reset of the prescaler of timers 0 and 1
@@ -105,7 +106,7 @@ BROKEN = 1 << 16
     IN_HEAD,
     IN_TAIL,
     _CPU_END,
-) = range(256, 256 + 67)
+) = range(256, 256 + 68)
 
 # --- When each source of events is due ----------------------------------------------------------------------
 (
@@ -164,6 +165,7 @@ PIPE_DELAY = 3
     F_PRESCALER,  # index of the prescaler's origin in the state
     F_HELD,
     F_DUE,
+    F_TRIGGERS,  # bits of TIFRn that start a conversion of the ADC when they rise
     F_TIFR,
     F_TIMSK,
     F_TCCRA,
@@ -171,7 +173,7 @@ PIPE_DELAY = 3
     F_PIN_A,
     F_PIN_B,
     _F_END,
-) = range(30)
+) = range(31)
 # Values of F_SHIFT below zero, F_SLOPE, F_TOP_SOURCE, F_LOAD_AT and F_OVERFLOW_AT.
 CLOCK_STOPPED, CLOCK_FALLING, CLOCK_RISING = -1, -2, -3
 SLOPE_COUNT, SLOPE_FAST, SLOPE_DUAL = 0, 1, 2

@@ -51,3 +51,4 @@ for _first, _last in (
 ):
     READS_PLAIN[_first : _last + 1] = True
 READS_PLAIN[[0x49, 0xC3]] = False  # no registers
+READS_PLAIN[PRR] = True

@@ -1,10 +1,12 @@
-"""Analogue-to-digital converter: conversion times, channels, references, free running (ATmega328P datasheet, 24).
+"""Analogue-to-digital converter: conversion times, channels, references, triggers (ATmega328P datasheet, 24).
 
 Inputs are voltages that the outside injects; without one, a channel sees its pin's digital level. Conversions are
 exact: no noise, no error. The prescaler counts from ADEN on; its first rising edge is taken one ADC clock later.
 """
 
 from __future__ import annotations
+
+import numpy as np
 
 from planarm_sim.cpu.compiled import kernel  # kernel_cache: see there
 from planarm_sim.cpu.layout import (
@@ -17,12 +19,17 @@ from planarm_sim.cpu.layout import (
     ADC_RESULT,
     ADC_SAMPLE,
     ADC_START,
+    ADC_TRIGGERED,
     DUE_ADC,
+    F_TRIGGERS,
+    HORIZON,
     LEVEL,
     NEVER,
+    TIMER0,
+    TIMER1,
     State,
 )
-from planarm_sim.cpu.registers import ADCL, ADCSRA, ADCSRB, ADMUX
+from planarm_sim.cpu.registers import ADCL, ADCSRA, ADCSRB, ADMUX, EIFR, TIFR0, TIFR1
 
 ADEN, ADSC, ADATE, ADIF, ADIE, ADPS = 1 << 7, 1 << 6, 1 << 5, 1 << 4, 1 << 3, 7  # ADCSRA
 ADLAR = 1 << 5  # ADMUX
@@ -36,6 +43,13 @@ CHANNELS, TEMPERATURE, BANDGAP = 8, 8, 14
 AREF = CHANNELS
 """Index of the reference pin among the inputs; a Uno leaves it open, and conversions against it read 1023."""
 NOT_DRIVEN = -1
+# Sources of triggers, values of ADTS2:0 (table 24-6), and their bits in EIFR, TIFR0 and TIFR1.
+FREE_RUNNING, BY_COMPARATOR, BY_INT0 = 0, 1, 2
+TRIGGER_INT0 = 1 << 0
+TRIGGERS_0 = np.array([0, 0, 0, 1 << 1, 1 << 0, 0, 0, 0], dtype=np.int64)
+TRIGGERS_1 = np.array([0, 0, 0, 0, 0, 1 << 2, 1 << 0, 1 << 5], dtype=np.int64)
+SYNCHRONISATION_CYCLES = 3
+"""CPU cycles from a trigger to the start of the prescaler that it resets (24.4)."""
 FULL_SCALE = 1023
 
 
@@ -56,12 +70,41 @@ def read_adc(st: State, address: int) -> int:
 @kernel
 def write_adc(st: State, address: int, value: int, cycle: int) -> None:
     """Write ADCSRA, ADCSRB or ADMUX; the data registers cannot be written."""
+    if address == ADMUX:
+        st[address] = value & 0xEF
+        return
+    signal = trigger_signal(st)
     if address == ADCSRA:
         write_control(st, value, cycle)
-    elif address == ADMUX:
-        st[address] = value & 0xEF
     elif address == ADCSRB:
         st[address] = value & (ACME | ADTS)
+    armed = st[ADCSRA] & ADEN and st[ADCSRA] & ADATE
+    source = st[ADCSRB] & ADTS
+    st[TIMER0 + F_TRIGGERS] = TRIGGERS_0[source] if armed else 0
+    st[TIMER1 + F_TRIGGERS] = TRIGGERS_1[source] if armed else 0
+    if address == ADCSRB and trigger_signal(st) and not signal:  # a change of source is an edge, too (24.9.4)
+        trigger(st, cycle)
+
+
+@kernel
+def trigger_signal(st: State) -> bool:
+    """Level of the chosen source; none of its own while running free."""
+    source = st[ADCSRB] & ADTS
+    if source == BY_INT0:
+        return bool(st[EIFR] & TRIGGER_INT0 != 0)
+    return bool((st[TIFR0] & TRIGGERS_0[source]) | (st[TIFR1] & TRIGGERS_1[source]) != 0)
+
+
+@kernel
+def trigger(st: State, cycle: int) -> None:
+    """The chosen source's flag has risen: reset the prescaler and start, unless a conversion is under way (24.3)."""
+    if st[ADCSRA] & ADEN and st[ADCSRA] & ADATE and st[ADC_PHASE] == IDLE:
+        st[ADCSRA] |= ADSC
+        st[ADC_PHASE] = WAITING
+        st[ADC_TRIGGERED] = 1
+        st[ADC_ORIGIN] = cycle + SYNCHRONISATION_CYCLES
+        st[DUE_ADC] = st[ADC_ORIGIN]
+        st[HORIZON] = min(st[HORIZON], st[DUE_ADC])
 
 
 @kernel
@@ -80,26 +123,32 @@ def write_control(st: State, value: int, cycle: int) -> None:
     if value & ADSC and value & ADEN and st[ADC_PHASE] == IDLE:
         st[ADCSRA] |= ADSC
         st[ADC_PHASE] = WAITING
+        st[ADC_TRIGGERED] = 0
         clock = adc_clock(st)
         st[DUE_ADC] = st[ADC_ORIGIN] + ((cycle - st[ADC_ORIGIN]) // clock + 1) * clock
 
 
 @kernel
 def advance_adc(st: State, cycle: int) -> None:
-    """The next step of a conversion: 1.5 ADC clocks to the sample, 13 in all; the first one 13.5 and 25 (24.4)."""
+    """The next step of a conversion: 1.5 ADC clocks to the sample, 13 in all (table 24-1).
+
+    A triggered one takes 2 and 13.5, the first one since ADEN 13.5 and 25.
+    """
     clock = adc_clock(st)
     if st[ADC_PHASE] == WAITING:
         start_conversion(st, cycle)
     elif st[ADC_PHASE] == SAMPLING:
         st[ADC_SAMPLE] = convert(st)
         st[ADC_PHASE] = CONVERTING
-        st[DUE_ADC] = st[ADC_START] + (25 if st[ADC_FIRST] else 13) * clock
+        halves = 50 if st[ADC_FIRST] else (27 if st[ADC_TRIGGERED] else 26)
+        st[DUE_ADC] = st[ADC_START] + halves * clock // 2
         st[ADC_FIRST] = 0
     else:
         if not st[ADC_LOCKED]:
             st[ADC_RESULT] = st[ADC_SAMPLE]
         st[ADCSRA] |= ADIF
-        if st[ADCSRA] & ADATE and st[ADCSRB] & ADTS == 0:  # free running
+        st[ADC_TRIGGERED] = 0
+        if st[ADCSRA] & ADATE and st[ADCSRB] & ADTS == FREE_RUNNING:
             start_conversion(st, cycle)
         else:
             st[ADCSRA] &= ~ADSC
@@ -113,7 +162,8 @@ def start_conversion(st: State, cycle: int) -> None:
     st[ADC_START] = cycle
     st[ADC_MUX] = st[ADMUX]
     st[ADC_PHASE] = SAMPLING
-    st[DUE_ADC] = cycle + (27 if st[ADC_FIRST] else 3) * adc_clock(st) // 2
+    halves = 27 if st[ADC_FIRST] else (4 if st[ADC_TRIGGERED] else 3)
+    st[DUE_ADC] = cycle + halves * adc_clock(st) // 2
 
 
 @kernel

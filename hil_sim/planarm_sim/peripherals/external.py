@@ -13,6 +13,7 @@ from planarm_sim.cpu.layout import (
     F_COUNT,
     F_ICR,
     F_SYNC,
+    F_TRIGGERS,
     NEVER,
     PIPE,
     PIPE_COUNT,
@@ -22,7 +23,8 @@ from planarm_sim.cpu.layout import (
     TIMER1,
     State,
 )
-from planarm_sim.cpu.registers import EIFR, PCIFR, TIFR1
+from planarm_sim.cpu.registers import ADCSRB, EIFR, PCIFR, TIFR1
+from planarm_sim.peripherals.adc import ADTS, BY_INT0, trigger
 from planarm_sim.peripherals.ports import EFFECT_CLOCK0, EFFECT_CLOCK1, EFFECT_INT0, EFFECT_INT1, EFFECT_PCI0
 from planarm_sim.peripherals.timers import ICF, advance_timer, clock_timer, plan_timer
 
@@ -35,6 +37,8 @@ def deliver_inputs(st: State, cycle: int) -> None:
     st[PIPE_HEAD] = (st[PIPE_HEAD] + 1) % PIPE_SLOTS
     st[PIPE_COUNT] -= 1
     st[DUE_PIPE] = st[PIPE + 2 * st[PIPE_HEAD]] if st[PIPE_COUNT] else NEVER
+    if effects & EFFECT_INT0 and not st[EIFR] & EFFECT_INT0 and st[ADCSRB] & ADTS == BY_INT0:
+        trigger(st, cycle)
     st[EIFR] |= effects & (EFFECT_INT0 | EFFECT_INT1)
     st[PCIFR] |= (effects // EFFECT_PCI0) & 7
     if effects & EFFECT_CLOCK0:
@@ -56,5 +60,7 @@ def capture(st: State, cycle: int) -> None:
     st[DUE_CAPTURE] = NEVER
     advance_timer(st, TIMER1, cycle)
     st[TIMER1 + F_ICR] = st[TIMER1 + F_COUNT]
+    if st[TIMER1 + F_TRIGGERS] & ICF & ~st[TIFR1]:
+        trigger(st, cycle)
     st[TIFR1] |= ICF
     plan_timer(st, TIMER1)

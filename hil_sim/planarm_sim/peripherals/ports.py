@@ -42,12 +42,13 @@ from planarm_sim.cpu.layout import (
     TOP_ICR,
     State,
 )
-from planarm_sim.cpu.registers import DDRB, EICRA, MCUCR, PCMSK0, PINB, PORTB, TCCR1B
+from planarm_sim.cpu.registers import DDRB, EICRA, MCUCR, PCMSK0, PINB, PORTB, PRR, TCCR1B
 
 # Effects of a pin change that wait in the input pipeline.
 EFFECT_INT0, EFFECT_INT1, EFFECT_PCI0 = 1, 2, 4  # and 8, 16 for pin-change groups 1 and 2
 EFFECT_CLOCK0, EFFECT_CLOCK1, EFFECT_CAPTURE, EFFECT_LEVEL = 32, 64, 128, 256
 
+PRTIM1 = 1 << 3  # PRR: timer 1 is switched off
 PUD = 1 << 4  # MCUCR: pull-ups off everywhere
 ICNC1, ICES1 = 1 << 7, 1 << 6  # TCCR1B
 CAPTURE_FILTER_CYCLES = 4  # the noise canceller wants four equal samples (datasheet, 16.6.2)
@@ -111,7 +112,7 @@ def notify_inputs(st: State, port: int, changed: int, level: int, cycle: int) ->
             effects |= EFFECT_CLOCK0
         if changed & CLOCK1_PIN and clocks(st[TIMER1 + F_SHIFT], level & CLOCK1_PIN):
             effects |= EFFECT_CLOCK1
-    elif port == PORT_B and changed & CAPTURE_PIN and st[TIMER1 + F_TOP_SOURCE] != TOP_ICR:
+    elif port == PORT_B and changed & CAPTURE_PIN and st[TIMER1 + F_TOP_SOURCE] != TOP_ICR and not st[PRR] & PRTIM1:
         schedule_capture(st, level & CAPTURE_PIN, cycle)
     if effects != 0:
         slot = PIPE + 2 * ((st[PIPE_HEAD] + st[PIPE_COUNT]) % PIPE_SLOTS)

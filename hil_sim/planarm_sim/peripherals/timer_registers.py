@@ -151,6 +151,12 @@ def power_up_timers(st: State) -> None:
 
 
 @kernel
+def clock_setting(t: int, control_b: int) -> int:
+    """F_SHIFT as CSn2:0 of TCCRnB say."""
+    return int(CLOCKS_2[control_b & 7] if t == TIMER2 else CLOCKS_01[control_b & 7])
+
+
+@kernel
 def apply_control(st: State, t: int, cycle: int) -> None:
     """Act on TCCRnA and TCCRnB as they now stand: mode, outputs, clock."""
     control_a = st[st[t + F_TCCRA]]
@@ -162,7 +168,7 @@ def apply_control(st: State, t: int, cycle: int) -> None:
     com_a = effective_com(control_a >> 6, slope, mode[5] != 0)
     com_b = effective_com((control_a >> 4) & 3, slope, False)
     set_outputs(st, t, com_a, com_b, cycle)
-    st[t + F_SHIFT] = CLOCKS_2[control_b & 7] if t == TIMER2 else CLOCKS_01[control_b & 7]
+    st[t + F_SHIFT] = clock_setting(t, control_b)
     st[t + F_SYNC] = cycle
 
 

@@ -39,6 +39,7 @@ from planarm_sim.cpu.layout import (
     F_TIMSK,
     F_TOP_FIXED,
     F_TOP_SOURCE,
+    F_TRIGGERS,
     HORIZON,
     NEVER,
     OVERRIDE,
@@ -51,6 +52,7 @@ from planarm_sim.cpu.layout import (
     TOP_OCR_A,
     State,
 )
+from planarm_sim.peripherals.adc import trigger
 from planarm_sim.peripherals.ports import set_override
 
 TOV, OCF_A, OCF_B, ICF = 1 << 0, 1 << 1, 1 << 2, 1 << 5  # bits of TIFRn, and of TIMSKn
@@ -157,6 +159,8 @@ def clock_timer(st: State, t: int, cycle: int) -> None:
         flags |= TOV
     if is_top and st[t + F_TOP_SOURCE] == TOP_ICR:
         flags |= ICF
+    if flags & st[t + F_TRIGGERS] & ~st[st[t + F_TIFR]]:
+        trigger(st, cycle)
     st[st[t + F_TIFR]] |= flags
 
     load_at = st[t + F_LOAD_AT]
@@ -231,7 +235,7 @@ def latch_output(st: State, t: int, channel: int, action: int, cycle: int) -> No
 @kernel
 def plan_timer(st: State, t: int) -> None:
     """Note when the CPU loop has to look at this timer next."""
-    watched = st[st[t + F_TIMSK]]
+    watched = st[st[t + F_TIMSK]] | st[t + F_TRIGGERS]
     if st[t + F_COM_A]:
         watched |= OCF_A
     if st[t + F_COM_B]:
