@@ -10,12 +10,12 @@ from hypothesis import strategies as st
 from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import dijkstra
 
-from planarm.search.best_first import BUCKETS_PER_CELL, FIRST_CAPACITY
 from planarm.search.draw import draw_subset
 from planarm.search.grid_search import find_path
 from planarm.search.lattice import make_lattice, node_at
 from planarm.search.result import SearchStatus
-from planarm.search.stencils import DRAWN, stencil
+from planarm.search.scratch import FIRST_ENTRIES, borrow, give_back
+from planarm.search.stencils import DRAWN, cover, stencil
 from search_maps import EXACT, PLANNERS, drawn_map, grid_map, planner
 
 
@@ -200,20 +200,63 @@ def test_there_and_back_are_equally_long_for_whole_neighbourhoods(algorithm, nei
         assert there.path.length_cm == pytest.approx(back.path.length_cm, rel=1e-13)
 
 
-def test_a_search_that_outgrows_its_first_open_list_and_every_bucket_is_still_exact():
+def test_a_search_that_outgrows_its_first_open_list_is_still_exact():
     free = random_free(11, (150, 160), 0.8)
+    kept = borrow(free.size)
+    give_back(kept._replace(entry_node=kept.entry_node[:FIRST_ENTRIES], entry_below=kept.entry_below[:FIRST_ENTRIES]))
     result = search(free, "chs", 80)
-    assert result.generated > 2 * FIRST_CAPACITY and BUCKETS_PER_CELL > 1.0
+    assert result.generated > 2 * FIRST_ENTRIES
     offsets = stencil("chs", 80)
     assert_same_length(result, dijkstra_cm(free, lambda ix, iy: offsets))
 
 
-def test_a_closed_node_is_expanded_once():
+@pytest.mark.parametrize(("algorithm", "neighbours"), EXACT)
+def test_few_nodes_are_expanded_again(algorithm, neighbours):
+    """Only those that a better way turns up for within a bucket."""
     free = random_free(3, (60, 60), 0.8)
-    result = search(free, "modified_a_star", 48)
-    assert result.expanded <= free.sum() and result.expanded <= result.generated
+    result = search(free, algorithm, neighbours)
+    assert result.expanded <= 1.1 * free.sum() and result.expanded <= result.generated
+
+
+@pytest.mark.parametrize("neighbours", [24, 48])
+def test_leaving_out_turns_in_the_open_changes_no_length(neighbours):
+    """Wide open maps with few posts, where most nodes look at three moves only."""
+    for seed in range(4):
+        free = random_free(seed, (50, 60), 0.995)
+        offsets = stencil("modified_a_star", neighbours)
+        assert_same_length(
+            search(free, "modified_a_star", neighbours), dijkstra_cm(free, lambda ix, iy, moves=offsets: moves)
+        )
+
+
+def test_what_an_earlier_search_left_in_memory_does_not_matter():
+    free = random_free(7, (40, 50), 0.8)
+    before = search(free, "chs", 56)
+    search(random_free(8, (90, 70), 0.9), "chs", 56)
+    kept = borrow(1)
+    kept.state[:], kept.g[:], kept.entry_node[:], kept.entry_below[:] = 131, 1, 3, 3
+    give_back(kept)
+    after = search(free, "chs", 56)
+    assert np.array_equal(before.path.points_cm, after.path.points_cm) and before.expanded == after.expanded
 
 
 def test_an_unknown_neighbourhood_is_refused():
     with pytest.raises(ValueError, match=r"planner\.neighbours = 5 is not defined for a_star; choose 8"):
         search(np.ones((3, 3), bool), "a_star", 5)
+
+
+@pytest.mark.parametrize(("algorithm", "neighbours"), EXACT)
+@pytest.mark.parametrize("seed", range(3))
+def test_moves_through_free_cells_are_dijkstras_on_those_moves(algorithm, neighbours, seed):
+    """`moves = "cells"`: a move is legal when the nodes of all cells that it crosses are free."""
+    free = random_free(seed, (18, 24), 0.8)
+    offsets = stencil(algorithm, neighbours)
+    rows, columns = free.shape
+
+    def legal(ix, iy):
+        for dx, dy in offsets.tolist():
+            cells = [(ix + x, iy + y) for x, y in cover(dx, dy)]
+            if all(0 <= x < columns and 0 <= y < rows and free[y, x] for x, y in cells):
+                yield dx, dy
+
+    assert_same_length(search(free, algorithm, neighbours, moves="cells"), dijkstra_cm(free, legal))

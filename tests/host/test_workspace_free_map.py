@@ -9,13 +9,18 @@ import pytest
 from host_scenes import FULL_TURN, make_scene, oracle_clearance_cm, random_obstacles
 from planarm.errors import SceneError
 from planarm.model.arm import Arm
-from planarm.model.kinematics import forward
+from planarm.model.kinematics import forward, inverse_2r
 from planarm.scene import Obstacle, load_scene
 from planarm.workspace.free_map import BLOCKED_CELL, MIXED, WHOLE, build_free_map
 from planarm.workspace.world import BEYOND_REACH, FREE, INNER_HOLE, LIMIT, OBSTACLE, build_world, clearances_cm
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 INNER_20_CM = ((radians(-90), radians(270)), (-acos(-0.75), acos(-0.75)))  # |theta2| at r = 20 for 30 + 20 cm
+
+
+def poses(scene, free_map):
+    """Joint angles at the nodes, NaN out of reach: shape [iy, ix, 2]."""
+    return inverse_2r(Arm.from_spec(scene.arm), np.dstack(np.meshgrid(free_map.x_cm, free_map.y_cm)), scene.arm.elbow)
 
 
 @pytest.mark.parametrize(("case", "free"), [(1, 2129), (2, 2708)])
@@ -49,13 +54,11 @@ def test_every_node_against_shapely(elbow, seed):
             seen.add(int(region))
             if not 20.0 <= r <= 50.0:
                 assert region == (INNER_HOLE if r < 20.0 else BEYOND_REACH)
-                assert np.isnan(free_map.clearance_cm[iy, ix])
                 continue
-            q = free_map.theta_rad[iy, ix]
+            q = inverse_2r(arm, (x, y), elbow)
             assert forward(arm, q)[-1] == pytest.approx((x, y), abs=1e-6)
             assert (q[1] <= 0) == (elbow == "up")
             clearance = oracle_clearance_cm(scene, arm, q)
-            assert free_map.clearance_cm[iy, ix] == pytest.approx(clearance, abs=1e-6)
             assert region == (FREE if clearance > scene.margin_cm else OBSTACLE)
     assert seen == {FREE, BEYOND_REACH, INNER_HOLE, OBSTACLE}
 
@@ -99,9 +102,11 @@ def test_the_margin_can_only_take_nodes_away():
 
 def test_a_limit_of_joint_1_forbids_by_itself():
     narrow = ((radians(10), radians(100)), FULL_TURN[1])
-    free_map = build_free_map(make_scene(limits=narrow))
-    within = (free_map.theta_rad[..., 0] >= narrow[0][0]) & (free_map.theta_rad[..., 0] <= narrow[0][1])
-    reached = ~np.isnan(free_map.clearance_cm)
+    scene = make_scene(limits=narrow)
+    free_map = build_free_map(scene)
+    theta1 = poses(scene, free_map)[..., 0]
+    reached = ~np.isnan(theta1)
+    within = (theta1 >= narrow[0][0]) & (theta1 <= narrow[0][1])
     assert np.array_equal(free_map.region == LIMIT, reached & ~within)
     assert np.array_equal(free_map.region == FREE, reached & within)
 
@@ -119,9 +124,9 @@ def test_limits_of_joint_2_are_tip_distances():
 def test_the_floor_keeps_elbow_and_tip_above_it():
     scene = make_scene(floor=True, y=(0.0, 50.0))
     arm, free_map = Arm.from_spec(scene.arm), build_free_map(scene)
-    reached = ~np.isnan(free_map.clearance_cm)
-    heights = forward(arm, free_map.theta_rad[reached])[:, 1:, 1].min(axis=1)
-    assert free_map.clearance_cm[reached] == pytest.approx(heights, abs=1e-9)
+    q = poses(scene, free_map)
+    reached = ~np.isnan(q[..., 0])
+    heights = forward(arm, q[reached])[:, 1:, 1].min(axis=1)
     assert np.array_equal(free_map.region[reached] == LIMIT, heights <= 0.4)
 
 
@@ -157,3 +162,40 @@ def test_limits_without_a_pose_on_the_elbow_side_are_a_scene_error():
     scene = make_scene([Obstacle("circle", (30.0, 0.0), 2.0)], limits=(FULL_TURN[0], (0.1, 1.0)), elbow="up")
     with pytest.raises(SceneError, match="no pose has its elbow 'up'"):
         build_free_map(scene)
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_blocks_judged_at_once_agree_with_single_poses(seed):
+    """Every node of random maps on fine cells, where most cells are settled in large blocks, against single poses."""
+    rng = np.random.default_rng(seed)
+    elbow, cell = str(rng.choice(["up", "down"])), float(rng.choice([0.2, 0.5, 1.0]))
+    limits1 = FULL_TURN[0] if seed % 3 else (float(rng.uniform(-1.5, 0.5)), float(rng.uniform(1.0, 4.0)))
+    limits2 = FULL_TURN[1] if seed % 2 else (-2.2, 2.2)
+    base = tuple(float(v) for v in rng.uniform(-4.0, 4.0, 2))
+    floor, base = seed % 4 == 1, (base[0], abs(base[1]))
+    scene = make_scene(
+        random_obstacles(rng, int(rng.integers(1, 12))),
+        elbow=elbow,
+        limits=(limits1, limits2),
+        base=base,
+        floor=floor,
+        cell=cell,
+        x=(-52.0, 40.0),
+        y=(-30.0, 52.0),
+    )
+    free_map, world = build_free_map(scene), build_world(scene)
+    q = poses(scene, free_map)
+    x, y = np.meshgrid(free_map.x_cm, free_map.y_cm)
+    r = np.hypot(x - base[0], y - base[1])
+    inside = (r >= world.arm.r_min_cm) & (r <= world.arm.r_max_cm)
+    clearance = np.full(r.shape, -np.inf)
+    clearance[inside] = clearances_cm(world, q[inside])  # floor included
+    joint1 = (q[..., 0] >= limits1[0]) & (q[..., 0] <= limits1[1])
+    expected = inside & joint1 & (clearance > scene.margin_cm)
+    unclear = np.abs(clearance - scene.margin_cm) < 1e-9
+    assert np.array_equal((free_map.region == FREE)[~unclear], expected[~unclear])
+    assert np.array_equal((free_map.region == INNER_HOLE), r < world.arm.r_min_cm - 1e-9)
+    assert np.array_equal((free_map.region == BEYOND_REACH), r > world.arm.reach_cm + 1e-9)
+    above = forward(Arm.from_spec(scene.arm), q[inside])[:, 1:, 1].min(axis=1) if floor else np.inf
+    no_limit = joint1[inside] & (above > scene.margin_cm)
+    assert np.array_equal((free_map.region == OBSTACLE)[inside], (no_limit & ~expected[inside]))

@@ -17,6 +17,7 @@ from planarm.workspace.proof import (
     SMALLEST_CM,
     UNPROVED,
     disc_verdict,
+    displacement_bound,
     motion_bound,
     next_piece,
     prove_curve,
@@ -90,9 +91,11 @@ def test_the_motion_bound_is_never_exceeded(seed):
         dtheta1, displacement = motion_bound(world.arm, r, rho)
         assert np.all(turn <= dtheta1 + 1e-7)
         assert np.all(moved <= displacement + 1e-6)
+        bound = displacement_bound(world.arm, r, rho)
+        assert np.all(moved <= bound + 1e-6) and bound <= 2.0 * displacement
         if len(moved):
-            tightest = max(tightest, moved[:, 0].max() / displacement)
-    assert tightest > 0.8  # a bound that is far too large would pass everything above
+            tightest = max(tightest, moved[:, 0].max() / bound)
+    assert tightest > 0.9  # a bound that is far too large would pass everything above
 
 
 def test_the_turn_of_joint_1_is_bounded_by_the_extremes_of_direction_and_of_beta():
@@ -115,7 +118,7 @@ def test_the_turn_of_joint_1_is_bounded_by_the_extremes_of_direction_and_of_beta
 def test_a_disc_is_proved_exactly_when_the_spare_clearance_exceeds_the_bound():
     scene = make_scene([Obstacle("circle", (40.0, -20.0), 4.0)])
     tip, rho = np.array([30.0, 25.0]), 1.5
-    _, displacement = motion_bound(build_world(scene).arm, float(np.hypot(*tip)), rho)
+    displacement = displacement_bound(build_world(scene).arm, float(np.hypot(*tip)), rho)
     clearance = spare_cm(scene, build_world(scene, 0.0), tip[None])[0]
     for share, verdict in [(0.99, PROVED), (1.01, UNPROVED)]:
         assert disc_verdict(build_world(scene, clearance - displacement / share), *tip, rho) == verdict

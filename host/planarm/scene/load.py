@@ -64,7 +64,7 @@ LINK_KEYS = ("port", "baud")
 ELBOWS: tuple[Elbow, ...] = ("up", "down", "either")
 SHAPES: tuple[Shape, ...] = ("circle", "square", "diamond", "triangle", "hexagon", "polygon")
 SUBSETS: tuple[Subset, ...] = ("run", "expansion")
-MOVES: tuple[Moves, ...] = ("proved", "nodes")
+MOVES: tuple[Moves, ...] = ("proved", "cells", "nodes")
 DRIVERS = ("a4988", "drv8825", "tmc2208", "tmc2209", "dm542", "tb6600")
 NEIGHBOURS: dict[Algorithm, tuple[int, ...]] = {
     "a_star": (8,),

@@ -11,7 +11,7 @@ Elbow = Literal["up", "down", "either"]
 Shape = Literal["circle", "square", "diamond", "triangle", "hexagon", "polygon"]
 Algorithm = Literal["a_star", "modified_a_star", "chaos_a_star", "chs"]
 Subset = Literal["run", "expansion"]
-Moves = Literal["proved", "nodes"]
+Moves = Literal["proved", "cells", "nodes"]
 Corners = Literal["blend", "stop"]
 
 Point = tuple[float, float]

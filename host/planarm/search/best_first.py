@@ -1,39 +1,58 @@
-"""The one best-first search of all four planners, on flat arrays.
+"""The one best-first search of all four planners, on flat arrays and in integers.
 
-A* (paper C, eq. 10): the open node with the least f = g + h is expanded, g the length from the start, h the straight
-distance to the goal. No move is shorter than the straight line it makes, so h is consistent and a closed node is
-final. Where the pseudo-code of paper C (figs. 3, 5, 7 and 9) never improves a node that is already open, this search
-does; without that the result is not the shortest path of the graph.
+A* (paper C, eq. 10): open nodes are expanded in the order of f = g + h, g the length from the start, h the length of
+the shortest way to the goal if nothing stood in between (`planarm.search.costs`), which is consistent. Where the
+pseudo-code of paper C (figs. 3, 5, 7 and 9) never improves a node that is already open, this search does; without
+that the result is not the shortest path of the graph.
+
+Nodes wait in buckets of f and leave a bucket in no special order. So a node can be expanded before the best way to it
+is known; it is then expanded again. All nodes below the current bucket are final, and the goal is when its bucket is
+done with: the result is the shortest path all the same.
 
 Whether a move is legal is asked late, as in Lazy Weighted A* (described with its kin by Mandalika, Salzman and
 Srinivasa, Lazy Receding Horizon A*, ICAPS 2018): only of the move by which a node was reached best, when the node
-comes up for expansion. If that move is not legal, the next best way to the node from the closed ones takes its place.
-The result is the shortest path on the graph of legal moves, and few moves have to be proved.
+comes up for expansion. If that move is not legal, the next best legal one from an expanded node takes its place, and
+from then on moves to this node are checked at once. The result is the shortest path on the graph of legal moves, and
+few moves have to be proved.
+
+Where everything within a move's reach is open, a shortest path goes on in its direction or a neighbouring one: any
+other turn has a shorter way round it. There the search looks at three moves, not at all.
 """
 
-from math import inf, sqrt
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from planarm.search.costs import norm
 from planarm.search.draw import draw_subset
-from planarm.search.open_list import BUCKET, MADE, NONE, WAITING, OpenList, make_open_list, pop, with_more_room
+from planarm.search.open_list import BUCKET, EXPANDED, MADE, NONE, WAITING, OpenList, make_open_list
+from planarm.search.scratch import borrow, give_back, with_more_entries
 from planarm.workspace.proof import PROVED, prove_line
 from planarm.workspace.world import ArmWorld
 from planarm_wire.kernel_cache import kernel
 
-UNSEEN = 0
-START = 255
-"""Values of `came_by` beside 1 + the move by which a node was reached."""
+SHUT, ROOM, WHOLE_ROOM = 0, 1, 2
+"""A node that is not to be entered: not free, or border; a free one; one whose cell is free as a whole."""
+
+REACHED, START, CHECKED = 3, 127, 128
+"""The state of a node that was reached by move k is REACHED + k, that of the start START; CHECKED is added where a
+move has been found not legal, so that all further ones are checked at once. Until then a node's state is its room."""
+
+UNREACHED = 1 << 62
+"""g where no way is known: even, like that of an expanded node, and larger than any."""
+
+NODES, CELLS, PROOF = range(3)
+"""What makes a move legal: its end is free; all cells it crosses are, at their nodes; it is proved free as a whole."""
+
+THREE = 3
+"""Moves that can follow one in the open: the same and its neighbours in direction."""
 
 FULL = -2
-"""What `expand` returns when the open list may run out of room."""
+"""What `expand` returns when the entries may run out of room."""
 
-BUCKETS_PER_CELL = 16.0
-"""Width of the open list's buckets: found by measurement; it changes speed, never a result."""
-
-FIRST_CAPACITY = 4096
+BUCKET_BITS = 35
+"""A bucket is 2^35 units wide, a quarter of a cell: found by measurement; it changes speed, never a length."""
 
 
 class Lattice(NamedTuple):
@@ -42,10 +61,8 @@ class Lattice(NamedTuple):
     A node is known by its place in these arrays.
     """
 
-    shut: NDArray[np.uint8]
-    """1 for a node that is not to be entered: not free, border, or closed by the search."""
-    whole: NDArray[np.uint8]
-    """1 where every pose with the tip in the cell is free."""
+    room: NDArray[np.uint8]
+    """SHUT, ROOM or WHOLE_ROOM."""
     width: int
     """Nodes in a row."""
     column: int
@@ -62,7 +79,11 @@ class Moves(NamedTuple):
     dy: NDArray[np.int64]
     jump: NDArray[np.int64]
     """What the move adds to a node's place in the lattice."""
-    length_cm: NDArray[np.float64]
+    cost: NDArray[np.int64]
+    planes: NDArray[np.int64]
+    """The norm of the stencil, for `planarm.search.costs.norm`."""
+    after: NDArray[np.int64]
+    """Row 0: all moves. Row 1 + k: the THREE that can follow move k in the open."""
     cover_first: NDArray[np.int64]
     """Where the move's cells begin in `cover`; one value more than there are moves."""
     cover: NDArray[np.int64]
@@ -72,8 +93,8 @@ class Moves(NamedTuple):
 class Rules(NamedTuple):
     """How moves are chosen and checked."""
 
-    proved: bool
-    """True: the whole straight move must be proved free. False: the node it leads to must be free."""
+    legal: int
+    """NODES, CELLS or PROOF."""
     drawn: int
     """Moves drawn at random at each expanded node, or 0 to use all."""
     seed: int
@@ -82,97 +103,159 @@ class Rules(NamedTuple):
 class Found(NamedTuple):
     """What a search leaves behind."""
 
-    nodes: list[int]
+    nodes: NDArray[np.int64]
     """The path from start to goal; empty when there is none."""
     expanded: int
-    """Nodes taken from the open list and closed, the goal included."""
+    """Expansions, those of a node that was improved afterwards included."""
     generated: int
     """Entries put on the open list: nodes reached for the first time or by a shorter way."""
 
 
-def best_first(lattice: Lattice, moves: Moves, rules: Rules, world: ArmWorld, start: int, goal: int) -> Found:
-    """Search a shortest path between two free nodes; `lattice.shut` is used up.
+def best_first(
+    lattice: Lattice,
+    moves: Moves,
+    rules: Rules,
+    world: ArmWorld,
+    start: int,
+    goal: int,
+    open_room: NDArray[np.uint8] | None = None,
+) -> Found:
+    """Search a shortest path between two free nodes.
 
-    Of several entries with equal f the newest is expanded first; of several equally short ways to a node the first
-    one found is kept. With the order of the moves fixed, so is the path.
+    Ties are broken by the order of the moves and of the buckets, so the path is the same wherever it is searched.
+
+    Args:
+        lattice: where the nodes are.
+        moves: the stencil on this lattice.
+        rules: how moves are chosen and checked.
+        world: the arm, for proofs.
+        start: node to begin at.
+        goal: node to reach.
+        open_room: not 0 where all nodes within the longest move's reach are as free as `rules` asks
+            (`lattice.open_room`); None looks at all moves everywhere.
     """
-    longest_cm = float(moves.length_cm.max())
-    queue = make_open_list(2.0 * longest_cm / lattice.cell_cm * BUCKETS_PER_CELL, FIRST_CAPACITY)
-    g_cm = np.empty(lattice.shut.size)
-    came_by = np.zeros(lattice.shut.size, np.uint8)
-    live = np.empty(lattice.shut.size, np.int64)
-    h_cm = _distance_cm(lattice, start, goal)
-    g_cm[start], came_by[start], live[start] = 0.0, START, 0
-    queue.f_cm[0], queue.node[0], queue.below[0] = h_cm, start, NONE
-    queue.ring[0], queue.counts[MADE], queue.counts[WAITING] = 0, 1, 1
-    expanded = 0
-    while True:
-        last, expanded = expand(lattice, moves, rules, world, goal, h_cm, g_cm, came_by, live, queue, expanded)
-        if last != FULL:
-            nodes = _trace(came_by, moves.jump, goal) if last == goal else []
-            return Found(nodes, expanded, int(queue.counts[MADE]))
-        queue = with_more_room(queue)
+    wide_open = lattice.room[:0] if open_room is None else open_room
+    width = lattice.width
+    longest = 2 * int(moves.cost.max()) >> BUCKET_BITS
+    lowest_f = norm(moves.planes, start % width - goal % width, start // width - goal // width)
+    memory = borrow(lattice.room.size)
+    memory.state[: lattice.room.size] = lattice.room
+    queue = make_open_list(longest + 2, memory.entry_node, memory.entry_below)
+    memory.state[start], memory.g[start] = START, 1
+    queue.node[0], queue.below[0], queue.ring[0] = start, NONE, 0
+    queue.counts[MADE], queue.counts[WAITING] = 1, 1
+    last = FULL
+    while last == FULL:
+        last = expand(lattice, moves, rules, world, goal, lowest_f, memory.state, memory.g, wide_open, queue)
+        if last == FULL:
+            memory = with_more_entries(memory)
+            queue = queue._replace(node=memory.entry_node, below=memory.entry_below)
+    nodes = _trace(memory.state, moves.jump, goal) if last == goal else np.empty(0, np.int64)
+    give_back(memory)
+    return Found(nodes, int(queue.counts[EXPANDED]), int(queue.counts[MADE]))
 
 
 @kernel
-def expand(
+def expand(  # noqa: C901, PLR0912, PLR0915 - one flat loop: a call that hands on arrays costs more than expanding a node
     lattice: Lattice,
     moves: Moves,
     rules: Rules,
     world: ArmWorld,
     goal: int,
-    lowest_f_cm: float,
-    g_cm: NDArray[np.float64],
-    came_by: NDArray[np.uint8],
-    live: NDArray[np.int64],
+    lowest_f: int,
+    state: NDArray[np.uint8],
+    g: NDArray[np.int64],
+    wide_open: NDArray[np.uint8],
     queue: OpenList,
-    expanded: int,
-) -> tuple[int, int]:
-    """Expand nodes until the goal is closed; return (goal, or NONE if it cannot be reached, or FULL; nodes expanded).
+) -> int:
+    """Expand nodes until the goal's bucket is done with; return the goal, NONE if it cannot be reached, or FULL.
 
-    `g_cm` and `came_by` say how a node was reached best, `live` its entry on the open list; of a closed node `live`
-    is -2 less its turn: never an entry, and the smaller the later.
+    `g` is the cost of the best known way to a node, plus 1 as long as the node waits to be expanded.
     """
-    shut, width, cell_cm = lattice.shut, lattice.width, lattice.cell_cm
-    dx, dy, jump, length_cm = moves.dx, moves.dy, moves.jump, moves.length_cm
-    f_cm, queued, below, heap, ring, counts = queue
-    goal_x, goal_y = goal % width, goal // width
-    every, only = np.arange(jump.size), np.empty(1, np.int64)
-    while counts[MADE] + jump.size <= f_cm.size:
-        node = pop(f_cm, queued, below, heap, ring, counts, live)
-        if node == NONE:
-            return NONE, expanded
-        if not rules.proved or came_by[node] == START or move_is_free(lattice, moves, world, node, came_by[node] - 1):
-            shut[node], live[node] = 1, -2 - expanded
-            expanded += 1
-            if node == goal:
-                return goal, expanded
-            source, order, used = node, every, jump.size
-            if rules.drawn > 0:
-                used = rules.drawn
-                draw_subset(order, used, rules.seed, 1 + node)
-        else:
-            only[0] = next_best_move(lattice, moves, rules, node, g_cm, came_by, live, every)
-            came_by[node] = UNSEEN
-            if only[0] == NONE:
+    room, width = lattice.room, lattice.width
+    dx, dy, jump, cost, planes, after = moves.dx, moves.dy, moves.jump, moves.cost, moves.planes, moves.after
+    cover_first, cover = moves.cover_first, moves.cover
+    queued, below, ring, counts = queue
+    mask, every, prune = ring.size - 1, jump.size, wide_open.size > 0
+    made, waiting, bucket, expanded = counts[MADE], counts[WAITING], counts[BUCKET], counts[EXPANDED]
+    goal_x, goal_y, rows_per_node = goal % width, goal // width, 1.0 / width
+    order = after[0].copy()
+    best = UNREACHED
+    result = NONE
+    while waiting > 0:
+        entry = ring[bucket & mask]
+        if entry == NONE:
+            bucket += 1
+            if (best - lowest_f) >> BUCKET_BITS < bucket:
+                break
+            continue
+        if made + every > queued.size:
+            result = FULL
+            break
+        ring[bucket & mask] = below[entry]
+        waiting -= 1
+        node = int(queued[entry])
+        from_g = g[node] - 1
+        if from_g & 1:  # expanded since it was put here
+            continue
+        y = int((node + 0.5) * rows_per_node)  # node // width, exact for all grids that fit into memory
+        x = node - y * width - goal_x
+        y -= goal_y
+        if best != UNREACHED and from_g + norm(planes, x, y) >= best:
+            continue
+        came = state[node]
+        if rules.legal != NODES and came < CHECKED and came != START and not (prune and wide_open[node]):
+            move = came - REACHED
+            source, least = node - jump[move], rules.legal
+            for i in range(cover_first[move], cover_first[move + 1]):
+                if room[source + cover[i]] < least:
+                    least = 0
+                    break
+            if least == 0 and (rules.legal == CELLS or not line_is_free(lattice, world, source, node)):
+                move, from_g = next_best_move(lattice, moves, rules, world, node, state, g)
+                state[node] = CHECKED + ROOM if move == NONE else CHECKED + REACHED + move
+                g[node] = UNREACHED
+                if move != NONE:
+                    g[node] = from_g + 1
+                    place = (from_g + norm(planes, x, y) - lowest_f) >> BUCKET_BITS & mask
+                    queued[made], below[made], ring[place] = node, ring[place], made
+                    made += 1
+                    waiting += 1
                 continue
-            source, order, used = node - jump[only[0]], only, 1
-        x, y, from_g_cm = source % width - goal_x, source // width - goal_y, g_cm[source]
+        g[node] = from_g
+        expanded += 1
+        if node == goal:
+            best = from_g
+            continue
+        row, used = 0, every
+        if rules.drawn > 0:
+            used = rules.drawn
+            draw_subset(order, used, rules.seed, 1 + node)
+        elif prune and wide_open[node] and came != START:
+            row, used = 1 + (came & (CHECKED - 1)) - REACHED, THREE
         for i in range(used):
-            k = order[i]
-            to, to_g_cm = source + jump[k], from_g_cm + length_cm[k]
-            if shut[to] or (came_by[to] != UNSEEN and to_g_cm >= g_cm[to]):
+            k = order[i] if row == 0 else after[row, i]
+            to = node + jump[k]
+            before = state[to]
+            if before == SHUT:
                 continue
-            to_f_cm = to_g_cm + cell_cm * sqrt(float((x + dx[k]) * (x + dx[k]) + (y + dy[k]) * (y + dy[k])))
-            bucket = int((to_f_cm - lowest_f_cm) / cell_cm * BUCKETS_PER_CELL)
-            place = max(bucket, counts[BUCKET]) & (ring.size - 1)  # below the current bucket only by rounding
-            entry = counts[MADE]
-            g_cm[to], came_by[to], live[to] = to_g_cm, 1 + k, entry
-            f_cm[entry], queued[entry], below[entry] = to_f_cm, to, ring[place]
-            ring[place] = entry
-            counts[MADE] += 1
-            counts[WAITING] += 1
-    return FULL, expanded
+            to_g = from_g + cost[k]
+            if before > WHOLE_ROOM:
+                if to_g + 1 >= g[to]:
+                    continue
+                if before >= CHECKED and not move_is_legal(lattice, moves, rules, world, to, k):
+                    continue
+            to_f = to_g + norm(planes, x + dx[k], y + dy[k])
+            if to_f >= best:
+                continue
+            g[to] = to_g + 1
+            state[to] = (before & CHECKED) + REACHED + k
+            place = (to_f - lowest_f) >> BUCKET_BITS & mask
+            queued[made], below[made], ring[place] = to, ring[place], made
+            made += 1
+            waiting += 1
+    counts[MADE], counts[WAITING], counts[BUCKET], counts[EXPANDED] = made, waiting, bucket, expanded
+    return goal if result != FULL and best != UNREACHED else result
 
 
 @kernel
@@ -180,43 +263,47 @@ def next_best_move(
     lattice: Lattice,
     moves: Moves,
     rules: Rules,
+    world: ArmWorld,
     node: int,
-    g_cm: NDArray[np.float64],
-    came_by: NDArray[np.uint8],
-    live: NDArray[np.int64],
-    scratch: NDArray[np.int64],
-) -> int:
-    """Return the best move from a closed node to an open one after the move by which it was reached, or NONE.
+    state: NDArray[np.uint8],
+    g: NDArray[np.int64],
+) -> tuple[int, int]:
+    """Return the best legal move to a node from an expanded one, and the cost of the way; (NONE, 0) if there is none.
 
-    Ways are ordered as the search finds them: by their length, then by the turn in which the node before was closed.
+    Candidates are proved in the order of cost, then of the moves, until one is legal; the move by which the node
+    was reached is known not to be.
     """
-    failed = node - moves.jump[came_by[node] - 1]
-    failed_g_cm, failed_live = g_cm[node], live[failed]
-    best, best_g_cm, best_live = NONE, inf, 0
-    for k in range(moves.jump.size):
-        source = node - moves.jump[k]
-        if not lattice.shut[source] or came_by[source] == UNSEEN:  # open, or never free
-            continue
-        through_g_cm = g_cm[source] + moves.length_cm[k]
-        tried = through_g_cm < failed_g_cm or (through_g_cm == failed_g_cm and live[source] >= failed_live)
-        worse = through_g_cm > best_g_cm or (through_g_cm == best_g_cm and live[source] < best_live)
-        if tried or worse:
-            continue
-        if rules.drawn > 0:
-            draw_subset(scratch, rules.drawn, rules.seed, 1 + source)
-            if not np.any(scratch[: rules.drawn] == k):
+    scratch = np.arange(moves.jump.size)
+    failed = (state[node] & (CHECKED - 1)) - REACHED
+    last_g, last_move = -1, -1
+    while True:
+        best, best_g = NONE, UNREACHED
+        for k in range(moves.jump.size):
+            source = node - moves.jump[k]
+            if k == failed or state[source] <= WHOLE_ROOM or g[source] & 1:
                 continue
-        best, best_g_cm, best_live = k, through_g_cm, live[source]
-    return best
+            through = g[source] + moves.cost[k]
+            if through >= best_g or through < last_g or (through == last_g and k <= last_move):
+                continue
+            if rules.drawn > 0:
+                draw_subset(scratch, rules.drawn, rules.seed, 1 + source)
+                if not np.any(scratch[: rules.drawn] == k):
+                    continue
+            best, best_g = k, through
+        if best == NONE:
+            return NONE, 0
+        if move_is_legal(lattice, moves, rules, world, node, best):
+            return best, best_g
+        last_g, last_move = best_g, best
 
 
 @kernel
-def move_is_free(lattice: Lattice, moves: Moves, world: ArmWorld, to: int, move: int) -> bool:
-    """Tell whether all poses of a move to the node `to` are free: all cells crossed are, or the line is proved."""
+def move_is_legal(lattice: Lattice, moves: Moves, rules: Rules, world: ArmWorld, to: int, move: int) -> bool:
+    """Tell whether a move to the node `to` is legal: all cells crossed are as free as asked, or the line is proved."""
     node = to - moves.jump[move]
-    for crossed in range(moves.cover_first[move], moves.cover_first[move + 1]):
-        if not lattice.whole[node + moves.cover[crossed]]:
-            return line_is_free(lattice, world, node, to)
+    for i in range(moves.cover_first[move], moves.cover_first[move + 1]):
+        if lattice.room[node + moves.cover[i]] < rules.legal:
+            return rules.legal == PROOF and line_is_free(lattice, world, node, to)
     return True
 
 
@@ -241,21 +328,22 @@ def node_cm(lattice: Lattice, node: int) -> tuple[float, float]:
 
 def load_kernels(world: ArmWorld) -> None:
     """Compile the search, or load it from the cache, by a search from a node to itself."""
-    nothing = np.zeros(1, np.uint8)
     one, first = np.ones(1, np.int64), np.zeros(2, np.int64)
-    lattice = Lattice(nothing, nothing, width=1, column=0, row=0, cell_cm=1.0)
-    moves = Moves(one, one, one, np.ones(1), first, one)
-    best_first(lattice, moves, Rules(proved=True, drawn=0, seed=0), world, 0, 0)
+    lattice = Lattice(np.ones(1, np.uint8), width=1, column=0, row=0, cell_cm=1.0)
+    moves = Moves(one, one, one, one, np.ones((1, 2), np.int64), np.zeros((2, 1), np.int64), first, one)
+    best_first(lattice, moves, Rules(PROOF, 0, 0), world, 0, 0)
 
 
-def _distance_cm(lattice: Lattice, a: int, b: int) -> float:
-    dx, dy = a % lattice.width - b % lattice.width, a // lattice.width - b // lattice.width
-    return lattice.cell_cm * sqrt(float(dx * dx + dy * dy))
-
-
-def _trace(came_by: NDArray[np.uint8], jump: NDArray[np.int64], goal: int) -> list[int]:
+@kernel
+def _trace(state: NDArray[np.uint8], jump: NDArray[np.int64], goal: int) -> NDArray[np.int64]:
     """Walk back from the goal; return the nodes from the start on."""
-    nodes = [goal]
-    while came_by[nodes[-1]] != START:
-        nodes.append(nodes[-1] - int(jump[came_by[nodes[-1]] - 1]))
-    return nodes[::-1]
+    count, node = 1, goal
+    while state[node] != START:
+        node -= jump[(state[node] & (CHECKED - 1)) - REACHED]
+        count += 1
+    nodes, node = np.empty(count, np.int64), goal
+    for i in range(count - 1, 0, -1):
+        nodes[i] = node
+        node -= jump[(state[node] & (CHECKED - 1)) - REACHED]
+    nodes[0] = node
+    return nodes

@@ -1,24 +1,41 @@
 """Path planning on the free Cartesian space: A*, Modified A*, Chaos A* and CHS (paper C, sections IV to VII).
 
 One search for all four; they differ in the stencil (`planarm.search.stencils`), and Chaos A* in using a random subset
-of it. With `moves = "proved"` every straight move between nodes is proved free for the whole arm; with "nodes" only
-the node at its end is checked, which is how the papers read, and such a path may pass through obstacles.
+of it. With `moves = "proved"` every straight move between nodes is proved free for the whole arm; with "cells" the
+nodes of all cells it crosses are checked, with "nodes" only the node at its end, which is how the papers read. A path
+that is not proved may pass through obstacles.
 """
 
 from dataclasses import replace
 from time import perf_counter
+from typing import Final
 
 import numpy as np
 
-from planarm.scene import PlannerSpec, Point
-from planarm.search.best_first import Found, Lattice, Rules, best_first, load_kernels, node_cm
+from planarm.scene import Moves, PlannerSpec, Point
+from planarm.search.best_first import (
+    CELLS,
+    NODES,
+    PROOF,
+    ROOM,
+    WHOLE_ROOM,
+    Found,
+    Lattice,
+    Rules,
+    best_first,
+    load_kernels,
+)
 from planarm.search.draw import draw_subset
 from planarm.search.endpoints import Endpoint, endpoint
-from planarm.search.lattice import make_lattice, make_moves, node_at
+from planarm.search.lattice import make_lattice, make_moves, node_at, nodes_cm, open_room
 from planarm.search.path import Path
 from planarm.search.result import SearchResult, SearchStatus
 from planarm.search.stencils import DRAWN, Offsets, primitive, stencil
 from planarm.workspace.free_map import FreeMap
+
+LEGAL: Final[dict[Moves, int]] = {"nodes": NODES, "cells": CELLS, "proved": PROOF}
+FEW_MOVES: Final = 8
+"""With no more moves than this, looking at all of them costs less than finding out where not all have to be."""
 
 
 def find_path(free_map: FreeMap, start_cm: Point, goal_cm: Point, planner: PlannerSpec) -> SearchResult:
@@ -35,7 +52,7 @@ def find_path(free_map: FreeMap, start_cm: Point, goal_cm: Point, planner: Plann
     begin_s = perf_counter()
     start = endpoint(free_map, "start", start_cm)
     goal = endpoint(free_map, "goal", goal_cm)
-    found, path = Found([], 0, 0), None
+    found, path = Found(np.empty(0, np.int64), 0, 0), None
     if start.problem:
         status, reason = SearchStatus.START_BLOCKED, start.problem
     elif goal.problem:
@@ -43,7 +60,7 @@ def find_path(free_map: FreeMap, start_cm: Point, goal_cm: Point, planner: Plann
     else:
         lattice = make_lattice(free_map, border=int(np.abs(offsets).max()))
         found = _search(free_map, lattice, offsets, planner, start, goal)
-        if found.nodes:
+        if len(found.nodes):
             status, reason, path = SearchStatus.FOUND, "", _path(free_map, lattice, found, start, goal)
         else:
             status, reason = SearchStatus.NO_PATH, _why_no_path(free_map, offsets, planner, start, goal, found)
@@ -54,16 +71,21 @@ def _search(
     free_map: FreeMap, lattice: Lattice, offsets: Offsets, planner: PlannerSpec, start: Endpoint, goal: Endpoint
 ) -> Found:
     """Search from the start's node to the goal's."""
-    proved, drawn = planner.moves == "proved", 0
+    whole_stencil, drawn, wide_open = offsets, 0, None
     if planner.algorithm == "chaos_a_star":
         drawn = DRAWN[planner.neighbours]
         if planner.subset == "run":
             offsets, drawn = _subset(offsets, drawn, planner.seed), 0
-    elif proved:
-        offsets = primitive(offsets)
+    else:
+        if planner.moves != "nodes":
+            offsets = primitive(offsets)
+        if len(offsets) > FEW_MOVES:
+            least = WHOLE_ROOM if planner.moves == "proved" else ROOM
+            wide_open = open_room(lattice, int(np.abs(offsets).max()), least)
     start_node, goal_node = (node_at(lattice, end.column, end.row) for end in (start, goal))
-    rules = Rules(proved, drawn, planner.seed)
-    return best_first(lattice, make_moves(offsets, lattice), rules, free_map.world, start_node, goal_node)
+    rules = Rules(LEGAL[planner.moves], drawn, planner.seed)
+    moves = make_moves(offsets, lattice, whole_stencil)
+    return best_first(lattice, moves, rules, free_map.world, start_node, goal_node, wide_open)
 
 
 def _subset(offsets: Offsets, drawn: int, seed: int) -> Offsets:
@@ -75,12 +97,14 @@ def _subset(offsets: Offsets, drawn: int, seed: int) -> Offsets:
 
 def _path(free_map: FreeMap, lattice: Lattice, found: Found, start: Endpoint, goal: Endpoint) -> Path:
     """Return the path through the found nodes, with the joins to a start and goal that are no nodes."""
-    points_cm = [node_cm(lattice, node) for node in found.nodes]
     if start.point_cm == goal.point_cm:
-        points_cm = [start.point_cm]
-    else:
-        points_cm = [start.point_cm] * (not start.on_node) + points_cm + [goal.point_cm] * (not goal.on_node)
-    return Path.through(np.array(points_cm), free_map.elbow)
+        return Path.through(np.array([start.point_cm]), free_map.elbow)
+    points_cm = nodes_cm(lattice, found.nodes)
+    if not start.on_node:
+        points_cm = np.concatenate([[start.point_cm], points_cm])
+    if not goal.on_node:
+        points_cm = np.concatenate([points_cm, [goal.point_cm]])
+    return Path.through(points_cm, free_map.elbow)
 
 
 def _why_no_path(
@@ -95,9 +119,9 @@ def _why_no_path(
     )
     if planner.algorithm == "chaos_a_star":
         return text + " The random subset of the neighbours may be to blame: try another planner.seed."
-    if planner.moves == "proved":
+    if planner.moves != "nodes":
         lattice = make_lattice(free_map, border=int(np.abs(offsets).max()))
-        if _search(free_map, lattice, offsets, replace(planner, moves="nodes"), start, goal).nodes:
+        if len(_search(free_map, lattice, offsets, replace(planner, moves="nodes"), start, goal).nodes):
             return text + (
                 " The nodes do connect, but between some of them the arm's move is blocked, runs over a joint's limit, "
                 "or has too little room for a proof: a smaller workspace.cell_cm or workspace.clearance_cm may help."

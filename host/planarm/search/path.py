@@ -27,5 +27,5 @@ class Path:
         """Return the path through the given way-points, shape (n, 2)."""
         points_cm = np.array(points_cm, dtype=np.float64)
         points_cm.flags.writeable = False
-        length_cm = fsum(dist(a, b) for a, b in pairwise(points_cm))
+        length_cm = fsum(dist(a, b) for a, b in pairwise(points_cm.tolist()))
         return cls(points_cm, length_cm, elbow)

@@ -1,33 +1,44 @@
 """Proofs that a moving arm stays free, by a bound on its motion; nothing here is sampled.
 
-The bound. Let the tip stay in a disc of radius rho around c, r_c from the base. Its direction phi changes by at most
-asin(rho / r_c), its distance r stays in [r_c - rho, r_c + rho], clipped to what reach and theta2's limits allow.
-With theta1 = phi +- beta(r), cos beta = (r^2 + l1^2 - l2^2) / (2 r l1), beta has its extremes at the ends of that
-range or at r* = sqrt(l1^2 - l2^2), where link 2 stands at a right angle to the tip's direction. So theta1 changes by
-at most dtheta1 = asin(rho / r_c) + max |beta(r) - beta(r_c)|, the elbow moves at most 2 l1 sin(dtheta1 / 2), every
-point of link 1 no farther than the elbow, and every point of link 2, whose displacement lies between those of its
-ends, no farther than the farther-moving end. A disc is free when the clearance at its centre exceeds the margin by
-more than this.
+The bound. While the tip moves by ds, link 1 turns by (f . ds) / (e x f), with e and f the links as vectors: by at
+most ds / (l1 |sin theta2|), so the elbow moves at most ds / |sin theta2|. Let the tip stay in a disc of radius rho
+around c, r_c from the base. |sin theta2|, as a function of the tip's distance r, rises and then falls, so on the disc
+it is least at r_c - rho or r_c + rho, and the elbow moves at most D = rho / min |sin theta2| on the straight way to any
+point of the disc. Every point of link 1 moves no farther than the elbow, and every point of link 2, whose displacement
+lies between those of its ends, no farther than the farther-moving end: D bounds them all. A disc is free when the
+clearance at its centre exceeds the margin by more than this.
+
+Near full stretch and full fold, where sin theta2 vanishes, another bound is finite: the tip's direction changes by at
+most asin(rho / r_c), its distance r stays in [r_c - rho, r_c + rho], clipped to what reach and theta2's limits allow.
+With theta1 = phi +- beta(r), cos beta = (r^2 + l1^2 - l2^2) / (2 r l1), beta has its extremes at the ends of that range
+or at r* = sqrt(l1^2 - l2^2), where link 2 stands at a right angle to the tip's direction. So theta1 changes by at most
+dtheta1 = asin(rho / r_c) + max |beta(r) - beta(r_c)|, and the elbow moves at most 2 l1 sin(dtheta1 / 2).
 
 A line or curve is proved free by covering it with discs, found by bisection.
 """
 
 from math import acos, asin, hypot, pi, sin, sqrt
 
-from planarm.model.collision import point_segment_distance2
+import numpy as np
+from numpy.typing import NDArray
+
+from planarm.model.collision import point_segment_distance2, segment_polygon_distance
 from planarm.model.kinematics import ROUNDING_CM
 from planarm.workspace.world import (
     FREE,
     ArmWorld,
     TwoLinkArm,
     cos_beta_at,
-    elbow_at,
+    elbow_from_base,
     floor_clearance,
-    obstacle_clearance,
+    links_apart2,
     region_at,
     theta1_at,
+    within_limits,
 )
 from planarm_wire.kernel_cache import kernel
+
+Floats = NDArray[np.float64]
 
 # Verdicts: the whole piece is free; a pose on it is not (the counterexample is told); neither could be shown.
 PROVED, BLOCKED, UNPROVED = 0, 1, 2
@@ -37,8 +48,29 @@ SMALLEST_CM = 1e-3
 
 
 @kernel
+def displacement_bound(arm: TwoLinkArm, r_cm: float, rho_cm: float) -> float:
+    """Return a bound in cm of any point's displacement while the tip moves from a disc's centre to elsewhere in it.
+
+    Args:
+        arm: the arm.
+        r_cm: distance of the disc's centre from the base, within reach and limits.
+        rho_cm: the disc's radius.
+    """
+    l1, l2 = arm.l1_cm, arm.l2_cm
+    half, scale = 0.5 * (l1 * l1 + l2 * l2), 1.0 / (l1 * l2)
+    low, high = max(r_cm - rho_cm, 0.0), r_cm + rho_cm
+    cos_low, cos_high = (0.5 * low * low - half) * scale, (0.5 * high * high - half) * scale
+    cos_here = (0.5 * r_cm * r_cm - half) * scale
+    sin2 = 1.0 - max(cos_low * cos_low, cos_high * cos_high)
+    if 4.0 * sin2 >= 1.0 - cos_here * cos_here and sin2 > 0.0:
+        return rho_cm / sqrt(sin2)
+    turned = motion_bound(arm, r_cm, rho_cm)[1]
+    return turned if sin2 <= 0.0 else min(turned, rho_cm / sqrt(sin2))
+
+
+@kernel
 def motion_bound(arm: TwoLinkArm, r_cm: float, rho_cm: float) -> tuple[float, float]:
-    """Return bounds (of theta1's change in rad, of any point's displacement in cm) while the tip stays in a disc.
+    """Return bounds (of theta1's change in rad, of any point's displacement in cm) that hold near singular poses, too.
 
     Args:
         arm: the arm.
@@ -57,41 +89,68 @@ def motion_bound(arm: TwoLinkArm, r_cm: float, rho_cm: float) -> tuple[float, fl
 
 
 @kernel
-def disc_is_free(arm: TwoLinkArm, r_cm: float, rho_cm: float, theta1_rad: float, spare_cm: float) -> bool:
-    """Tell whether all poses with the tip in a disc are free, as far as the tips are within reach and theta2's limits.
-
-    A disc that holds the base never is.
-
-    Args:
-        arm: the arm.
-        r_cm: distance of the disc's centre from the base.
-        rho_cm: the disc's radius.
-        theta1_rad: joint 1 at the centre.
-        spare_cm: clearance beyond the margin at the centre.
-    """
-    dtheta1, displacement = motion_bound(arm, r_cm, rho_cm)
-    if theta1_rad - dtheta1 < arm.theta1_min_rad or theta1_rad + dtheta1 > arm.theta1_max_rad:
-        return False
-    return rho_cm < r_cm and spare_cm > displacement + ROUNDING_CM
-
-
-@kernel
 def disc_verdict(world: ArmWorld, x_cm: float, y_cm: float, rho_cm: float) -> int:
     """Judge all poses with the tip in the disc around (x, y), as far as its tip distances are within reach and limits.
 
     BLOCKED means that the pose at the centre is not free. A disc that holds the base is never proved.
     """
-    arm = world.arm
-    r = hypot(x_cm - arm.base_x_cm, y_cm - arm.base_y_cm)
+    obstacles = world.obstacles
+    return _verdict(
+        world.arm,
+        obstacles.centers_cm,
+        obstacles.radii_cm,
+        obstacles.first_vertex,
+        obstacles.vertices_cm,
+        x_cm - world.arm.base_x_cm,
+        y_cm - world.arm.base_y_cm,
+        rho_cm,
+    )
+
+
+@kernel
+def _verdict(
+    arm: TwoLinkArm,
+    centers_cm: Floats,
+    radii_cm: Floats,
+    first_vertex: NDArray[np.int64],
+    vertices_cm: Floats,
+    x: float,
+    y: float,
+    rho_cm: float,
+) -> int:
+    """`disc_verdict` for a disc around (x, y) from the base, with the obstacles' arrays one by one, which is faster."""
+    bx, by, margin, per_l1, per_l2 = arm.base_x_cm, arm.base_y_cm, arm.margin_cm, arm.per_l1, arm.per_l2
+    r2 = x * x + y * y
+    r = sqrt(r2)
     if region_at(arm, r) != FREE:
         return BLOCKED
-    ex, ey = elbow_at(arm, x_cm, y_cm, r)
-    distance, _ = obstacle_clearance(world, ex, ey, x_cm, y_cm)
-    spare = min(distance, floor_clearance(arm, ey, y_cm)) - arm.margin_cm
-    theta1 = theta1_at(arm, x_cm, y_cm, acos(cos_beta_at(arm, r)))
-    if spare <= 0.0 or theta1 < arm.theta1_min_rad or theta1 > arm.theta1_max_rad:
+    ex, ey = elbow_from_base(arm, x, y, r2, r)
+    moves = displacement_bound(arm, r, rho_cm) + ROUNDING_CM
+    height = floor_clearance(arm, by + ey, by + y)
+    if height <= margin:
         return BLOCKED
-    return PROVED if disc_is_free(arm, r, rho_cm, theta1, spare) else UNPROVED
+    free = rho_cm < r and height > margin + moves
+    for i in range(radii_cm.size):
+        cx, cy, keep = centers_cm[i, 0] - bx, centers_cm[i, 1] - by, radii_cm[i] + margin
+        apart2 = links_apart2(cx, cy, ex, ey, x, y, per_l1, per_l2)
+        if apart2 > (keep + moves) * (keep + moves):
+            continue
+        first, end = first_vertex[i], first_vertex[i + 1]
+        if first == end:
+            blocked, clear = apart2 <= keep * keep, False
+        else:
+            apart = min(
+                segment_polygon_distance(bx, by, bx + ex, by + ey, vertices_cm, first, end),
+                segment_polygon_distance(bx + ex, by + ey, bx + x, by + y, vertices_cm, first, end),
+            )
+            blocked, clear = apart <= margin, apart > margin + moves
+        if blocked:
+            return BLOCKED
+        free = free and clear
+    if within_limits(arm, bx + ex, by + ey, moves):
+        return PROVED if free else UNPROVED
+    theta1 = theta1_at(arm, bx + x, by + y, acos(cos_beta_at(arm, r)))
+    return BLOCKED if theta1 < arm.theta1_min_rad or theta1 > arm.theta1_max_rad else UNPROVED
 
 
 @kernel
@@ -120,20 +179,21 @@ def prove_line(world: ArmWorld, x0: float, y0: float, x1: float, y1: float) -> t
         UNPROVED with the share around which the margin is too small for a proof, or joint 1 comes to the end of its
         limits (at the ends of a full turn no single pose is forbidden, only the way across).
     """
-    arm = world.arm
-    dx, dy = x1 - x0, y1 - y0
-    length = hypot(dx, dy)
-    toward_base = (arm.base_x_cm - x0) * dx + (arm.base_y_cm - y0) * dy
-    nearest = min(1.0, max(0.0, toward_base / (length * length))) if length > 0.0 else 0.0
+    arm, obstacles = world.arm, world.obstacles
+    centers, radii = obstacles.centers_cm, obstacles.radii_cm
+    first_vertex, vertices = obstacles.first_vertex, obstacles.vertices_cm
+    x0, y0, dx, dy = x0 - arm.base_x_cm, y0 - arm.base_y_cm, x1 - x0, y1 - y0
+    length = sqrt(dx * dx + dy * dy)
+    nearest = min(1.0, max(0.0, -(x0 * dx + y0 * dy) / (length * length))) if length > 0.0 else 0.0
     for share in (0.0, 1.0, nearest):
-        r = hypot(x0 + share * dx - arm.base_x_cm, y0 + share * dy - arm.base_y_cm)
-        if region_at(arm, r) != FREE:
+        x, y = x0 + share * dx, y0 + share * dy
+        if region_at(arm, sqrt(x * x + y * y)) != FREE:
             return BLOCKED, share
     start, width = 0.0, 1.0
     while start < 1.0:
         middle = start + 0.5 * width
         rho = 0.5 * width * length
-        verdict = disc_verdict(world, x0 + middle * dx, y0 + middle * dy, rho)
+        verdict = _verdict(arm, centers, radii, first_vertex, vertices, x0 + middle * dx, y0 + middle * dy, rho)
         if verdict == PROVED:
             start, width = next_piece(start, width)
         elif verdict == BLOCKED or rho <= SMALLEST_CM:

@@ -43,6 +43,11 @@ class TwoLinkArm(NamedTuple):
     """theta1 is told in [turn_start_rad, turn_start_rad + 2 pi)."""
     theta1_min_rad: float
     theta1_max_rad: float
+    limit_rays: tuple[float, float, float, float]
+    """Directions (cos, sin) of link 1 at the least and at the greatest theta1."""
+    per_l1: float
+    per_l2: float
+    """1 / l1^2 and 1 / l2^2, so that kernels need not divide."""
     margin_cm: float
     """A pose is free when its clearance exceeds this."""
     floor: bool
@@ -84,6 +89,7 @@ def build_world(scene: Scene, margin_cm: float | None = None, elbow: ElbowSide |
     arm = Arm.from_spec(scene.arm)
     l1, l2 = arm.link_lengths_cm
     r_min, r_max = _tip_distances_cm(scene, side)
+    low, high = arm.joint_limits_rad[0]
     numbers = TwoLinkArm(
         l1_cm=l1,
         l2_cm=l2,
@@ -94,8 +100,11 @@ def build_world(scene: Scene, margin_cm: float | None = None, elbow: ElbowSide |
         r_min_cm=r_min,
         r_max_cm=r_max,
         turn_start_rad=turn_start_rad(arm),
-        theta1_min_rad=arm.joint_limits_rad[0][0],
-        theta1_max_rad=arm.joint_limits_rad[0][1],
+        theta1_min_rad=low,
+        theta1_max_rad=high,
+        limit_rays=(cos(low), sin(low), cos(high), sin(high)),
+        per_l1=1.0 / (l1 * l1),
+        per_l2=1.0 / (l2 * l2),
         margin_cm=scene.margin_cm if margin_cm is None else margin_cm,
         floor=scene.arm.floor,
     )
@@ -131,6 +140,26 @@ def elbow_at(arm: TwoLinkArm, x_cm: float, y_cm: float, r_cm: float) -> tuple[fl
 
 
 @kernel
+def elbow_from_base(arm: TwoLinkArm, x: float, y: float, r2: float, r: float) -> tuple[float, float]:
+    """Return the elbow seen from the base for a tip (x, y) from it, its distance r and r^2: with one division."""
+    l1, per_r = arm.l1_cm, 1.0 / r
+    along = min(l1, max(-l1, 0.5 * (r2 + l1 * l1 - arm.l2_cm * arm.l2_cm) * per_r))
+    aside = arm.side * sqrt(l1 * l1 - along * along)
+    return per_r * (x * along - y * aside), per_r * (y * along + x * aside)
+
+
+@kernel
+def links_apart2(cx: float, cy: float, ex: float, ey: float, x: float, y: float, per_l1: float, per_l2: float) -> float:
+    """Return the squared distance from c to the nearer link; c, elbow and tip as seen from the base. No division."""
+    share = min(1.0, max(0.0, (cx * ex + cy * ey) * per_l1))
+    ax, ay = cx - share * ex, cy - share * ey
+    ux, uy, vx, vy = x - ex, y - ey, cx - ex, cy - ey
+    share = min(1.0, max(0.0, (vx * ux + vy * uy) * per_l2))
+    dx, dy = vx - share * ux, vy - share * uy
+    return min(ax * ax + ay * ay, dx * dx + dy * dy)
+
+
+@kernel
 def cos_beta_at(arm: TwoLinkArm, r_cm: float) -> float:
     """Return cos beta: beta is the angle at the base from the tip's direction to link 1, by the law of cosines."""
     l1, l2 = arm.l1_cm, arm.l2_cm
@@ -149,6 +178,26 @@ def theta2_at(arm: TwoLinkArm, r_cm: float) -> float:
     """Return theta2 for a tip at distance r from the base."""
     l1, l2 = arm.l1_cm, arm.l2_cm
     return -arm.side * acos(min(1.0, max(-1.0, (r_cm * r_cm - l1 * l1 - l2 * l2) / (2.0 * l1 * l2))))
+
+
+@kernel
+def within_limits(arm: TwoLinkArm, ex: float, ey: float, room_cm: float) -> bool:
+    """Tell whether joint 1 stays inside its limits while the elbow moves no farther than `room_cm` from (ex, ey).
+
+    The elbow must be on the inner side of both limits' rays and farther than that from each.
+    """
+    low_x, low_y, high_x, high_y = arm.limit_rays
+    vx, vy = ex - arm.base_x_cm, ey - arm.base_y_cm
+    left_of_low, left_of_high = low_x * vy - low_y * vx, high_x * vy - high_y * vx
+    if low_x * vx + low_y * vy > 0.0 and abs(left_of_low) <= room_cm + ROUNDING_CM:
+        return False
+    if high_x * vx + high_y * vy > 0.0 and abs(left_of_high) <= room_cm + ROUNDING_CM:
+        return False
+    turn = arm.theta1_max_rad - arm.theta1_min_rad
+    if turn >= 2.0 * pi:
+        return room_cm < arm.l1_cm
+    inside = left_of_low > 0.0, left_of_high < 0.0
+    return room_cm < arm.l1_cm and ((inside[0] and inside[1]) if turn <= pi else (inside[0] or inside[1]))
 
 
 @kernel

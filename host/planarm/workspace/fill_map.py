@@ -1,0 +1,219 @@
+"""Classify the cells of a map, large blocks at once.
+
+A block of cells is judged by the disc around it: while the tip stays in it no point of the arm moves farther than the
+bound of `planarm.workspace.proof`. Obstacles farther off than that, seen from the pose at its centre, are forgotten for
+the whole block; with none left it is free as a whole, with one that stays too near it is blocked as a whole. What
+cannot be settled is divided into four, down to small blocks, whose cells are judged one by one against the few
+obstacles left. So the work grows with the border between free and blocked, and a thousand obstacles cost little more
+than ten.
+"""
+
+from math import acos, sqrt
+
+import numpy as np
+from numpy.typing import NDArray
+
+from planarm.model.collision import point_segment_distance2, segment_polygon_distance
+from planarm.model.kinematics import ROUNDING_CM
+from planarm.workspace.proof import disc_within_reach, displacement_bound
+from planarm.workspace.world import (
+    BEYOND_REACH,
+    FREE,
+    INNER_HOLE,
+    LIMIT,
+    OBSTACLE,
+    ArmWorld,
+    cos_beta_at,
+    elbow_at,
+    elbow_from_base,
+    floor_clearance,
+    links_apart2,
+    region_at,
+    theta1_at,
+    within_limits,
+)
+from planarm_wire.kernel_cache import kernel
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+LEAF_CELLS = 8
+"""Blocks of so many rows and columns are judged cell by cell: found by measurement."""
+
+LARGEST_BLOCK = 256
+
+MIXED_BLOCK = 255
+"""Stands for a block's region where its cells differ, or might."""
+
+
+@kernel
+def fill(
+    world: ArmWorld, x_cm: Floats, y_cm: Floats, cell_cm: float, region: NDArray[np.uint8], whole: NDArray[np.bool_]
+) -> None:
+    """Fill `region` and `whole`, both [iy, ix], for the nodes at `x_cm` and `y_cm`."""
+    rows, columns = region.shape
+    obstacles = world.obstacles.radii_cm.size
+    block = LEAF_CELLS
+    while block < LARGEST_BLOCK and block < max(rows, columns):
+        block *= 2
+    near = np.empty(12 * (obstacles + 1), np.int64)
+    stack = np.empty((64, 4), np.int64)
+    for top in range(0, rows, block):
+        for left in range(0, columns, block):
+            for i in range(obstacles):
+                near[i] = i
+            stack[0] = top, left, block, 0
+            _fill_block(world, x_cm, y_cm, cell_cm, region, whole, stack, near, obstacles)
+
+
+@kernel
+def _fill_block(
+    world: ArmWorld,
+    x_cm: Floats,
+    y_cm: Floats,
+    cell_cm: float,
+    region: NDArray[np.uint8],
+    whole: NDArray[np.bool_],
+    stack: Ints,
+    near: Ints,
+    obstacles: int,
+) -> None:
+    """Divide and judge the block on the stack: rows (iy, ix, size, place of its list of obstacles in `near`).
+
+    A list ends where its length was noted: `counts` by its place's level. Lists of finer blocks lie behind those of the
+    blocks that hold them.
+    """
+    rows, columns = region.shape
+    ends = np.zeros(64, np.int64)
+    depth, ends[0] = 1, obstacles
+    while depth > 0:
+        depth -= 1
+        iy, ix, size, first = stack[depth, 0], stack[depth, 1], stack[depth, 2], stack[depth, 3]
+        end = ends[depth]
+        bottom, right = min(iy + size, rows), min(ix + size, columns)
+        if bottom <= iy or right <= ix:
+            continue
+        x, y = 0.5 * (x_cm[ix] + x_cm[right - 1]), 0.5 * (y_cm[iy] + y_cm[bottom - 1])
+        dx, dy = 0.5 * (x_cm[right - 1] - x_cm[ix] + cell_cm), 0.5 * (y_cm[bottom - 1] - y_cm[iy] + cell_cm)
+        verdict, no_limit, kept = judge_block(world, x, y, sqrt(dx * dx + dy * dy), near, first, end)
+        if verdict != MIXED_BLOCK:
+            region[iy:bottom, ix:right] = verdict
+            whole[iy:bottom, ix:right] = verdict == FREE
+        elif size <= LEAF_CELLS:
+            _fill_cells(world, x_cm, y_cm, cell_cm, region, whole, iy, bottom, ix, right, near[end:kept], no_limit)
+        else:
+            half = size // 2
+            for i in range(4):
+                stack[depth] = iy + (i >> 1) * half, ix + (i & 1) * half, half, end
+                ends[depth] = kept
+                depth += 1
+
+
+@kernel
+def judge_block(
+    world: ArmWorld, x_cm: float, y_cm: float, rho_cm: float, near: Ints, first: int, end: int
+) -> tuple[int, bool, int]:
+    """Judge all poses with the tip in a disc, given the obstacles near[first:end] that may matter.
+
+    Returns:
+        (region of all of them or MIXED_BLOCK, whether no limit or floor is met, end of the list of the obstacles that
+        still matter): that list begins at `end`.
+    """
+    arm = world.arm
+    dx, dy = x_cm - arm.base_x_cm, y_cm - arm.base_y_cm
+    r = sqrt(dx * dx + dy * dy)
+    if r - rho_cm > arm.reach_cm + ROUNDING_CM:
+        return BEYOND_REACH, True, end
+    if r + rho_cm < arm.r_min_cm - ROUNDING_CM:
+        return INNER_HOLE, True, end
+    if not disc_within_reach(arm, r, rho_cm):
+        for i in range(first, end):
+            near[end + i - first] = near[i]
+        return MIXED_BLOCK, False, end + end - first
+    ex, ey = elbow_at(arm, x_cm, y_cm, r)
+    displacement = displacement_bound(arm, r, rho_cm) + ROUNDING_CM
+    no_limit = within_limits(arm, ex, ey, displacement)
+    no_limit = no_limit and floor_clearance(arm, ey, y_cm) > arm.margin_cm + displacement
+    kept, blocked = end, False
+    for i in range(first, end):
+        distance = _clearance(world, near[i], ex, ey, x_cm, y_cm, arm.margin_cm + displacement)
+        if distance <= arm.margin_cm + displacement:
+            near[kept] = near[i]
+            kept += 1
+            blocked = blocked or distance + displacement <= arm.margin_cm
+    if no_limit and blocked:
+        return OBSTACLE, True, kept
+    return FREE if no_limit and kept == end else MIXED_BLOCK, no_limit, kept
+
+
+@kernel
+def _clearance(world: ArmWorld, i: int, ex: float, ey: float, x: float, y: float, enough_cm: float) -> float:
+    """Return the distance in cm of obstacle i to the links, negative inside a circle; a lower one above `enough_cm`."""
+    arm, obstacles = world.arm, world.obstacles
+    cx, cy, radius = obstacles.centers_cm[i, 0], obstacles.centers_cm[i, 1], obstacles.radii_cm[i]
+    bx, by = arm.base_x_cm, arm.base_y_cm
+    distance = sqrt(min(point_segment_distance2(cx, cy, bx, by, ex, ey), point_segment_distance2(cx, cy, ex, ey, x, y)))
+    first, end = obstacles.first_vertex[i], obstacles.first_vertex[i + 1]
+    if first == end or distance - radius > enough_cm:
+        return float(distance - radius)
+    to_link1 = segment_polygon_distance(bx, by, ex, ey, obstacles.vertices_cm, first, end)
+    to_link2 = segment_polygon_distance(ex, ey, x, y, obstacles.vertices_cm, first, end)
+    return to_link1 if to_link1 < to_link2 else to_link2
+
+
+@kernel
+def _fill_cells(
+    world: ArmWorld,
+    x_cm: Floats,
+    y_cm: Floats,
+    cell_cm: float,
+    region: NDArray[np.uint8],
+    whole: NDArray[np.bool_],
+    top: int,
+    bottom: int,
+    left: int,
+    right: int,
+    near: Ints,
+    no_limit: bool,
+) -> None:
+    """Judge the cells of a small block one by one."""
+    arm = world.arm
+    centers, radii, first_vertex = world.obstacles.centers_cm, world.obstacles.radii_cm, world.obstacles.first_vertex
+    bx, by, margin, rho = arm.base_x_cm, arm.base_y_cm, arm.margin_cm, 0.5 * sqrt(2.0) * cell_cm
+    for iy in range(top, bottom):
+        for ix in range(left, right):
+            x, y = x_cm[ix] - bx, y_cm[iy] - by
+            r2 = x * x + y * y
+            r = sqrt(r2)
+            node = region_at(arm, r)
+            if node != FREE:
+                region[iy, ix], whole[iy, ix] = node, False
+                continue
+            ex, ey = elbow_from_base(arm, x, y, r2, r)
+            free = rho < r and disc_within_reach(arm, r, rho)
+            moves = displacement_bound(arm, r, rho) + ROUNDING_CM if free else 0.0
+            if not no_limit and not within_limits(arm, ex + bx, ey + by, moves):
+                free = False
+                theta1 = theta1_at(arm, x + bx, y + by, acos(cos_beta_at(arm, r)))
+                if theta1 < arm.theta1_min_rad or theta1 > arm.theta1_max_rad:
+                    region[iy, ix], whole[iy, ix] = LIMIT, False
+                    continue
+            if arm.floor:
+                height = floor_clearance(arm, ey + by, y + by)
+                free = free and height > margin + moves
+                if height <= margin:
+                    region[iy, ix], whole[iy, ix] = LIMIT, False
+                    continue
+            for i in near:
+                cx, cy, keep = centers[i, 0] - bx, centers[i, 1] - by, radii[i] + margin
+                apart2 = links_apart2(cx, cy, ex, ey, x, y, arm.per_l1, arm.per_l2)
+                blocked = apart2 <= keep * keep
+                clear = apart2 > (keep + moves) * (keep + moves)
+                if not clear and first_vertex[i] != first_vertex[i + 1]:
+                    apart = _clearance(world, i, ex + bx, ey + by, x + bx, y + by, margin + moves)
+                    blocked, clear = apart <= margin, apart > margin + moves
+                free = free and clear
+                if blocked:
+                    node, free = OBSTACLE, False
+                    break
+            region[iy, ix], whole[iy, ix] = node, free
