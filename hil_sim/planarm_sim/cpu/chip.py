@@ -7,9 +7,7 @@ start-up delay that the fuses select is not part of the count.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from enum import Enum, IntFlag
-from typing import Any, Final, Protocol
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +21,16 @@ from planarm_sim.cpu.dispatch import run
 from planarm_sim.cpu.interrupts import note_raised
 from planarm_sim.cpu.program import Program
 from planarm_sim.cpu.service import stand_still
+from planarm_sim.cpu.values import (
+    EDGE_DTYPE,
+    TX_DTYPE,
+    FirstTouch,
+    Parity,
+    ResetCause,
+    Snapshot,
+    StopCause,
+    Watcher,
+)
 from planarm_sim.errors import DefectError, ImageError, PinError, UsageError
 from planarm_sim.peripherals.adc import NOT_DRIVEN, SUPPLY_UV
 from planarm_sim.peripherals.ports import drive_from_outside, refresh_port
@@ -31,39 +39,22 @@ from planarm_sim.peripherals.timer_registers import power_up_timers
 from planarm_sim.peripherals.usart import RXEN, UDRE, plan_receiver
 from planarm_sim.peripherals.watchdog import WDE, plan_watchdog
 
+__all__ = [
+    "BOOT_WORDS",
+    "EDGE_DTYPE",
+    "PINS",
+    "SRAM_BYTES",
+    "TX_DTYPE",
+    "Chip",
+    "FirstTouch",
+    "Parity",
+    "ResetCause",
+    "Snapshot",
+    "StopCause",
+    "Watcher",
+]
 
-class StopCause(Enum):
-    """Why `Chip.run_to` came back."""
-
-    REACHED = "the target cycle is reached"
-    BREAK = "BREAK instruction"
-    BAD_OPCODE = "undefined opcode"
-    ASLEEP = "asleep and nothing can wake the chip"
-    BREAKPOINT = "a breakpoint is reached"
-
-
-class ResetCause(IntFlag):
-    """Sources of reset, as their bits stand in MCUSR (ATmega328P datasheet, 11.9.1)."""
-
-    POWER_ON = 1
-    EXTERNAL = 2
-    BROWN_OUT = 4
-    WATCHDOG = 8
-
-
-class Parity(Enum):
-    """Parity of a serial frame."""
-
-    NONE = "none"
-    EVEN = "even"
-    ODD = "odd"
-
-
-EDGE_DTYPE: Final = np.dtype([("cycle", np.int64), ("pin", np.uint8), ("level", np.uint8)])
-"""An edge of an output pin: the cycle of the electrical change, the pin, its new level."""
-TX_DTYPE: Final = np.dtype([("cycle", np.int64), ("byte", np.uint16), ("bit_cycles", np.int32)])
-"""A frame sent: the cycle at which its last stop bit ends, the character, cycles per bit."""
-
+_NO_EDGES, _NO_FRAMES = np.empty(0, dtype=EDGE_DTYPE), np.empty(0, dtype=TX_DTYPE)
 PINS: Final = 24
 SRAM_BYTES: Final = reg.SRAM_END - reg.SRAM_START
 BOOT_WORDS: Final = (256, 512, 1024, 2048)
@@ -76,43 +67,6 @@ _STOPS = {
     service.ASLEEP_FOR_EVER: StopCause.ASLEEP,
     service.TRAPPED: StopCause.BREAKPOINT,
 }
-
-
-@dataclass(frozen=True, slots=True)
-class Snapshot:
-    """Everything that decides the chip's further run; opaque, made by `Chip.snapshot`."""
-
-    state: NDArray[np.int64]
-    memory: NDArray[np.uint8]
-    program: Program
-    queues: tuple[NDArray[np.int64], ...]
-
-
-@dataclass(frozen=True, slots=True)
-class FirstTouch:
-    """The first access of the program to a register of a part that is not modelled.
-
-    Attributes:
-        address: in the data space; 0x900 and above is beyond the chip's memory.
-        register: the datasheet's name, or the address in hexadecimal where there is no register.
-        pc: word address of the instruction.
-    """
-
-    address: int
-    register: str
-    pc: int
-
-
-class Watcher(Protocol):
-    """What may run the chip in the CPU loop's stead, to see more of it; `planarm_sim.insight` has one."""
-
-    def advance(self, st: at.State, memory: at.Bytes, words: at.State, program: Program, target: int) -> int:
-        """Run as `dispatch.run` does."""
-        ...
-
-    def restart(self, cycle: int) -> None:
-        """The chip is reset at `cycle`."""
-        ...
 
 
 class Chip:
@@ -300,6 +254,8 @@ class Chip:
         """Return and forget the frames that ended on TXD, TX_DTYPE in order of time."""
         st = self._state
         count, base = int(st[at.TX_COUNT]), int(st[at.TX_BASE])
+        if count == 0:
+            return _NO_FRAMES
         raw = st[base : base + count * at.TX_WIDTH].reshape(count, at.TX_WIDTH)
         result = np.empty(count, dtype=TX_DTYPE)
         for column, name in enumerate(("cycle", "byte", "bit_cycles")):
@@ -316,6 +272,8 @@ class Chip:
         """
         st = self._state
         count, base = int(st[at.EDGE_COUNT]), int(st[at.EDGE_BASE])
+        if count == 0:
+            return _NO_EDGES
         raw = st[base : base + count]
         result = np.empty(count, dtype=EDGE_DTYPE)
         result["cycle"] = raw >> 8
