@@ -120,20 +120,20 @@ def prove_pieces(world: JointWorld, borders_s: Floats, coefficients: Floats) -> 
 def pose_spare_cm(world: JointWorld, q_rad: Floats) -> float:
     """Return the least clearance of any link, obstacles and floor, beyond the margin, for angles of shape (n,)."""
     ends = np.empty((world.lengths_cm.shape[0] + 1, 2))
-    _link_ends(world, q_rad, ends)
+    link_ends(world, q_rad, ends)
     spare = inf
     for k in range(q_rad.shape[0]):
-        spare = min(spare, _link_spare(world, ends, k))
+        spare = min(spare, link_spare(world, ends, k))
     return spare
 
 
 @kernel
 def _judge(world: JointWorld, q: Floats, sway: Floats, ends: Floats) -> int:
     """Judge all poses within `sway` of q, joint by joint; BLOCKED tells of q itself. `ends` is room to work in."""
-    _link_ends(world, q, ends)
+    link_ends(world, q, ends)
     verdict, before = PROVED, 0.0
     for k in range(q.shape[0]):
-        spare = _link_spare(world, ends, k)
+        spare = link_spare(world, ends, k)
         if spare <= 0.0:
             return BLOCKED
         after = _end_move(world, ends, sway, k)
@@ -144,7 +144,7 @@ def _judge(world: JointWorld, q: Floats, sway: Floats, ends: Floats) -> int:
 
 
 @kernel
-def _link_ends(world: JointWorld, q: Floats, ends: Floats) -> None:
+def link_ends(world: JointWorld, q: Floats, ends: Floats) -> None:
     """Fill the positions of base and all links' ends, shape (n + 1, 2)."""
     ends[0, 0], ends[0, 1] = world.base_x_cm, world.base_y_cm
     heading = 0.0
@@ -155,7 +155,7 @@ def _link_ends(world: JointWorld, q: Floats, ends: Floats) -> None:
 
 
 @kernel
-def _link_spare(world: JointWorld, ends: Floats, k: int) -> float:
+def link_spare(world: JointWorld, ends: Floats, k: int) -> float:
     """Return link k's clearance beyond the margin."""
     clearance, _ = segment_clearance(ends[k, 0], ends[k, 1], ends[k + 1, 0], ends[k + 1, 1], world.obstacles, inf)
     if world.floor:
