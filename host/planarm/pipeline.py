@@ -12,13 +12,18 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from planarm.analysis.step_count import Waveform, compare_steps, measure_steps
 from planarm.arm_findings import SETTLE_S, ArmFindings, judge_arm, start_tick_of
 from planarm.errors import CertificateError, NoPathError, SceneError, StepsDifferError, TimingError
+from planarm.fastest.task import fastest_path
 from planarm.link.arm_record import ArmSetup, ArmTrace
 from planarm.link.exchange import StreamResult, stream_plan
 from planarm.link.transport import PinTrace, Transport, open_transport
 from planarm.model.arm import Arm
+from planarm.model.kinematics import forward
 from planarm.model.transmission import motor_axes
 from planarm.plan import Findings, Plan
 from planarm.plan_file import StoredPlan
@@ -34,7 +39,9 @@ from planarm.stepping.certify import Certificate, certify
 from planarm.stepping.quantise import quantisation_bound_cm, quantise
 from planarm.stepping.segments import Coding, SegmentPlan, compress, expand
 from planarm.summary import summarise
+from planarm.trajectory.binding import report_timing
 from planarm.trajectory.limits import Limits
+from planarm.trajectory.motion import Trajectory
 from planarm.trajectory.timing import fastest_motion
 from planarm.workspace.check_task import check_task
 from planarm.workspace.free_map import FreeMap, build_free_map
@@ -44,6 +51,9 @@ from planarm_wire.messages import DIR_PINS, STEP_PINS
 
 Notice = Callable[[str, float], None]
 """Told the stage and the share of it that is done."""
+
+CURVE_POINTS = 400
+"""Positions by which the curve of a motion is told in reports."""
 
 LONGEST_MOTION_S = 600.0
 """The certificate looks at a motion every 0.1 ms; beyond ten minutes that takes gigabytes."""
@@ -61,8 +71,11 @@ def plan_scene(scene: Scene, notice: Notice) -> Plan:
     notice("plan", 0.0)
     free_map, path, search_s = shortest_path(scene)
     notice("plan", 0.4)
-    smooth = smoothed(scene, free_map, path)
-    trajectory = fastest_motion(smooth, Limits.of(scene))
+    limits = Limits.of(scene)
+    trajectory = fastest_motion(smoothed(scene, free_map, path), limits)
+    if scene.planner.objective == "time":
+        trajectory = optimised(scene, free_map.margin_cm, trajectory, limits, notice)
+        path = TipPath.through(tip_curve_cm(trajectory, Arm.from_spec(scene.arm)), path.elbow)
     if trajectory.duration_s > LONGEST_MOTION_S:
         raise TimingError(
             f"{scene.source}: the motion would take {trajectory.duration_s:.6g} s, {LONGEST_MOTION_S:g} s are the "
@@ -78,12 +91,13 @@ def plan_scene(scene: Scene, notice: Notice) -> Plan:
         scene,
         free_map,
         path,
-        smooth,
+        trajectory.path,
         trajectory,
         train,
         segments,
         certificate,
         plan_ms=1e3 * (time.perf_counter() - began_s),
+        timing=report_timing(trajectory, limits),
         search_ms=1e3 * search_s,
     )
 
@@ -123,6 +137,23 @@ def smoothed(scene: Scene, free_map: FreeMap, path: TipPath) -> SmoothPath:
     return smooth_path(
         path, free_map, Arm.from_spec(scene.arm), world, motion.tolerance_cm, stop=motion.corners == "stop"
     )
+
+
+def optimised(scene: Scene, margin_cm: float, known: Trajectory, limits: Limits, notice: Notice) -> Trajectory:
+    """Optimise the path itself for duration; return the known motion when no faster one is found within the budget."""
+    spline = fastest_path(
+        scene, margin_cm, known.path, limits, time.perf_counter, lambda share, _best_s: notice("optimise", share)
+    )
+    notice("optimise", 1.0)
+    if spline is None:
+        return known
+    return min(known, fastest_motion(spline, limits), key=lambda motion: motion.duration_s)
+
+
+def tip_curve_cm(trajectory: Trajectory, arm: Arm) -> NDArray[np.float64]:
+    """Return positions of the tip along a motion, shape (m, 2), for reports."""
+    s = np.linspace(trajectory.s[0], trajectory.s[-1], CURVE_POINTS)
+    return np.asarray(forward(arm, trajectory.path.evaluate(s).q_rad)[:, -1])
 
 
 def no_path(scene: Scene, margin_cm: float) -> SceneError | NoPathError:

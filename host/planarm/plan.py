@@ -11,6 +11,7 @@ from planarm.smoothing.smooth_path import SmoothPath
 from planarm.stepping.certificate import Certificate
 from planarm.stepping.plan import SegmentPlan
 from planarm.stepping.train import StepTrain
+from planarm.trajectory.binding import TimingReport
 from planarm.trajectory.motion import Trajectory
 from planarm.workspace.free_map import FreeMap
 
@@ -29,6 +30,8 @@ class Plan:
     certificate: Certificate
     plan_ms: float
     """Wall time of the whole planning, certificate included."""
+    timing: TimingReport
+    """Which limits hold the motion back, and what the braking share costs."""
     search_ms: float
     """Wall time of the grid search alone."""
 

@@ -44,6 +44,14 @@ ALLOWED: dict[str, set[str]] = {
         "planarm.smoothing",
         "planarm_wire.kernel_cache",
     },
+    "planarm.fastest": {
+        "planarm.scene",
+        "planarm.model",
+        "planarm.workspace",
+        "planarm.smoothing",
+        "planarm.trajectory",
+        "planarm_wire.kernel_cache",
+    },
     "planarm.stepping": {
         "planarm.errors",
         "planarm.scene",
@@ -77,6 +85,7 @@ ALLOWED: dict[str, set[str]] = {
         "planarm.search",
         "planarm.smoothing",
         "planarm.trajectory",
+        "planarm.fastest",
         "planarm.stepping",
         "planarm.link",
         "planarm.analysis",

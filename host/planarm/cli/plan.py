@@ -33,7 +33,7 @@ def execute(options: argparse.Namespace) -> int:
     told = {
         "plan": str(target),
         "path_length_cm": plan.path.length_cm,
-        "motion_s": plan.trajectory.duration_s,
+        **plan.timing.figures(),
         "segments": len(plan.segments.segments),
         "plan_ms": plan.plan_ms,
     }
@@ -41,4 +41,5 @@ def execute(options: argparse.Namespace) -> int:
         print(json.dumps(told))
     else:
         print(f"{target}: {plan.path.length_cm:.4f} cm in {plan.trajectory.duration_s:.3f} s")
+        print(plan.timing.words())
     return 0

@@ -19,6 +19,7 @@ from planarm.scene.types import (
     JointSpec,
     LinkSpec,
     Moves,
+    Objective,
     Obstacle,
     PlannerSpec,
     Range,
@@ -47,7 +48,7 @@ WORKSPACE_KEYS = ("x_cm", "y_cm", "cell_cm", "clearance_cm")
 ROUND_KEYS = ("shape", "center_cm", "diameter_cm")
 POLYGON_KEYS = ("shape", "vertices_cm")
 TASK_KEYS = ("start_cm", "goal_cm")
-PLANNER_KEYS = ("algorithm", "neighbours", "subset", "seed", "moves")
+PLANNER_KEYS = ("algorithm", "neighbours", "subset", "seed", "moves", "objective", "budget_s")
 JOINT_KEYS = (
     "steps_per_rev",
     "microsteps",
@@ -65,6 +66,7 @@ ELBOWS: tuple[Elbow, ...] = ("up", "down", "either")
 SHAPES: tuple[Shape, ...] = ("circle", "square", "diamond", "triangle", "hexagon", "polygon")
 SUBSETS: tuple[Subset, ...] = ("run", "expansion")
 MOVES: tuple[Moves, ...] = ("proved", "cells", "nodes")
+OBJECTIVES: tuple[Objective, ...] = ("length", "time")
 DRIVERS = ("a4988", "drv8825", "tmc2208", "tmc2209", "dm542", "tb6600")
 NEIGHBOURS: dict[Algorithm, tuple[int, ...]] = {
     "a_star": (8,),
@@ -145,6 +147,8 @@ def with_planner(
         "subset": before.subset,
         "seed": before.seed if seed is None else seed,
         "moves": before.moves,
+        "objective": before.objective,
+        "budget_s": before.budget_s,
     }
     if neighbours is not None:
         changed["neighbours"] = neighbours
@@ -240,6 +244,8 @@ def _planner(table: Table) -> PlannerSpec:
         subset=table.choice("subset", SUBSETS, "run"),
         seed=table.integer("seed", 1, at_least=0, at_most=2**32 - 1),
         moves=table.choice("moves", MOVES, "proved"),
+        objective=table.choice("objective", OBJECTIVES, "length"),
+        budget_s=table.number("budget_s", 3.0, at_least=0.1, at_most=3600.0),
     )
 
 

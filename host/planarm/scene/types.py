@@ -13,6 +13,7 @@ Algorithm = Literal["a_star", "modified_a_star", "chaos_a_star", "chs"]
 Subset = Literal["run", "expansion"]
 Moves = Literal["proved", "cells", "nodes"]
 Corners = Literal["blend", "stop"]
+Objective = Literal["length", "time"]
 
 Point = tuple[float, float]
 Range = tuple[float, float]
@@ -80,7 +81,8 @@ class PlannerSpec:
     """The search: algorithm, neighbourhood, and how moves are checked.
 
     `subset` says how often Chaos A* draws its subset of the neighbours; `moves` "proved" proves every move free,
-    "nodes" checks grid nodes only, as the papers do.
+    "nodes" checks grid nodes only, as the papers do. `objective` "time" goes on from the path found and optimises the
+    path itself for duration, for `budget_s` seconds.
     """
 
     algorithm: Algorithm
@@ -88,6 +90,8 @@ class PlannerSpec:
     subset: Subset
     seed: int
     moves: Moves
+    objective: Objective = "length"
+    budget_s: float = 3.0
 
 
 @dataclass(frozen=True, slots=True)

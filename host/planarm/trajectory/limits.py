@@ -72,6 +72,11 @@ class Limits:
         return cls.of_joints(scene.joints, motion.acceleration_share if share is None else share, load)
 
     @property
+    def acceleration_share(self) -> float:
+        """The share of the acceleration as it was asked for, without the headroom."""
+        return self.share / HEADROOM
+
+    @property
     def joints(self) -> int:
         """The number of joints."""
         return len(self.speeds_rad_s)

@@ -1,0 +1,68 @@
+"""From a scene to the optimiser's task: its arm, its room, and the poses at start and goal."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from planarm.fastest.search import Budget, Clock, Task, Told, find_fastest
+from planarm.model.arm import Arm
+from planarm.model.kinematics import inverse_2r
+from planarm.scene import Scene
+from planarm.smoothing.joint_spline import JointSpline
+from planarm.smoothing.smooth_path import Floats, SmoothPath
+from planarm.trajectory.limits import Limits
+from planarm.workspace.joint_proof import JointWorld, joint_world
+from planarm.workspace.world import elbow_sides
+
+POSES_OF_A_PATH = 60
+
+
+def scene_task(scene: Scene, margin_cm: float, limits: Limits) -> Task:
+    """Return what a scene asks of the optimiser.
+
+    With one elbow side, joint 2 keeps its sign; with "either", both sides are tried at start and goal, and the arm may
+    pass through full stretch. The tip stays in the workspace's rectangle.
+
+    Args:
+        scene: the scene, with a two-link arm.
+        margin_cm: least distance of a link's centre line to an obstacle.
+        limits: what the joints can.
+    """
+    arm = Arm.from_spec(scene.arm)
+    sides = elbow_sides(scene.arm)
+    starts, goals = (
+        [inverse_2r(arm, point, side) for side in sides] for point in (scene.task.start_cm, scene.task.goal_cm)
+    )
+    box_cm = np.array([*scene.workspace.x_cm, *scene.workspace.y_cm])
+    ends = [(start, goal) for start in starts for goal in goals]
+    return Task(arm, _one_sided(joint_world(scene, margin_cm), sides), limits, ends, box_cm)
+
+
+def _one_sided(world: JointWorld, sides: Sequence[str]) -> JointWorld:
+    if len(sides) > 1:
+        return world
+    low, high = world.low_rad.copy(), world.high_rad.copy()
+    if sides[0] == "up":
+        high[1] = min(high[1], 0.0)
+    else:
+        low[1] = max(low[1], 0.0)
+    return world._replace(low_rad=low, high_rad=high)
+
+
+def fastest_path(
+    scene: Scene, margin_cm: float, known: SmoothPath, limits: Limits, clock: Clock, told: Told
+) -> JointSpline | None:
+    """Return the fastest path found within the scene's budget; None when none was proved free.
+
+    Args:
+        scene: the scene.
+        margin_cm: least distance of a link's centre line to an obstacle.
+        known: a path from start to goal, as one of the starts.
+        limits: what the joints can; speeds and accelerations are optimised for, torque is left to the timing.
+        clock: for the budget.
+        told: told the share of the budget used and the best duration.
+    """
+    task = scene_task(scene, margin_cm, limits)
+    s = np.linspace(known.borders_s[0], known.borders_s[-1], POSES_OF_A_PATH)
+    way: Floats = known.evaluate(s).q_rad
+    return find_fastest(task, [way], Budget(scene.planner.budget_s), scene.planner.seed, clock, told)

@@ -1,0 +1,95 @@
+"""What holds a motion back: which joint and which limit, and what the braking share costs."""
+
+from dataclasses import dataclass, replace
+from typing import Any, Literal
+
+import numpy as np
+
+from planarm.trajectory.check import limit_use
+from planarm.trajectory.limits import HEADROOM, Limits
+from planarm.trajectory.motion import Trajectory
+from planarm.trajectory.planes import Grid
+from planarm.trajectory.timing import solve
+
+LimitName = Literal["speed", "acceleration", "torque"]
+
+
+@dataclass(frozen=True, slots=True)
+class Binding:
+    """A limit that holds the motion back for a share of its duration; joints are counted from 1."""
+
+    joint: int
+    limit: LimitName
+    share: float
+
+
+@dataclass(frozen=True, slots=True)
+class TimingReport:
+    """Why a motion takes as long as it does.
+
+    Attributes:
+        binding: the limits in the order of their shares; every moment counts for the limit used most in it.
+        duration_s: of the motion.
+        acceleration_share: the share of the acceleration that it uses.
+        full_acceleration_s: what it would take with all of the acceleration, nothing left for a stop.
+    """
+
+    binding: tuple[Binding, ...]
+    duration_s: float
+    acceleration_share: float
+    full_acceleration_s: float
+
+    @property
+    def braking_cost(self) -> float:
+        """How much longer the motion takes for the share of acceleration that is kept for a stop, as a share."""
+        return self.duration_s / self.full_acceleration_s - 1.0 if self.full_acceleration_s > 0.0 else 0.0
+
+    def figures(self) -> dict[str, Any]:
+        """Return the report as plain values for JSON."""
+        return {
+            "motion_s": round(self.duration_s, 6),
+            "motion_full_acceleration_s": round(self.full_acceleration_s, 6),
+            "acceleration_share": self.acceleration_share,
+            "binding_limits": [
+                {"joint": b.joint, "limit": b.limit, "share_of_time": round(b.share, 4)} for b in self.binding
+            ],
+        }
+
+    def words(self) -> str:
+        """Say what holds the motion back, such as ``joint 1 speed 60 % of the time; ...``."""
+        if not self.binding:
+            return "nothing moves"
+        held = ", ".join(f"joint {b.joint} {b.limit} {100.0 * b.share:.0f} %" for b in self.binding if b.share >= 0.005)
+        return f"held back by {held} of the time; keeping a stop possible costs {100.0 * self.braking_cost:.1f} %"
+
+
+def report_timing(trajectory: Trajectory, limits: Limits) -> TimingReport:
+    """Return what holds a timed motion back.
+
+    Args:
+        trajectory: the motion.
+        limits: the limits it was timed under.
+    """
+    if len(trajectory.t_s) == 1:
+        return TimingReport((), 0.0, limits.acceleration_share, 0.0)
+    use = limit_use(trajectory, limits)
+    names: tuple[LimitName, ...] = ("speed", "acceleration", "torque")
+    most = np.stack([use.speed, use.acceleration, use.torque], axis=1).reshape(len(use.slack), -1).argmax(axis=1)
+    shares = np.bincount(most, np.diff(trajectory.t_s), minlength=3 * limits.joints) / trajectory.duration_s
+    binding = [
+        Binding(int(k % limits.joints) + 1, names[k // limits.joints], float(shares[k]))
+        for k in np.argsort(-shares, kind="stable")
+        if shares[k] > 0.0
+    ]
+    full_s = _full_acceleration_s(trajectory, limits)
+    return TimingReport(tuple(binding), trajectory.duration_s, limits.acceleration_share, full_s)
+
+
+def _full_acceleration_s(trajectory: Trajectory, limits: Limits) -> float:
+    """Return the duration with all of the acceleration, on the motion's own grid."""
+    if limits.acceleration_share >= 1.0:
+        return trajectory.duration_s
+    ones = np.ones((len(trajectory.s) - 1, limits.joints))
+    grid = Grid(trajectory.s, ones, ones, ones, trajectory.s_dot**2)
+    full = replace(limits, accelerations_rad_s2=limits.accelerations_rad_s2 / limits.acceleration_share, share=HEADROOM)
+    return min(trajectory.duration_s, solve(trajectory.path, grid, full).duration_s)
