@@ -7,6 +7,7 @@
     ├── EmulatorError     2  the emulator cannot start: image, link or file
     ├── OutputError       2  a file or folder cannot be written
     ├── PlanFileError     2  the file is no plan, or cannot be read
+    ├── CaptureError      2  the recording of the pins cannot be read, or does not show what is asked
     ├── NoPathError       3  start and goal are fine, but no collision-free path joins them
     ├── TimingError       4  the path cannot be timed within the joints' limits
     ├── CertificateError  4  a check of the finished plan failed
@@ -63,6 +64,12 @@ class OutputError(PlanarmError):
 
 class PlanFileError(PlanarmError):
     """What was given as a plan is none, or cannot be read."""
+
+    exit_code: ClassVar[int] = 2
+
+
+class CaptureError(PlanarmError):
+    """A recording of the pins is damaged, cannot be read, or does not hold what is asked of it."""
 
     exit_code: ClassVar[int] = 2
 

@@ -64,7 +64,7 @@ ALLOWED: dict[str, set[str]] = {
     # docs/decisions/0020: the emulated arm is built from the scene's shapes and transmission
     "planarm.link": {"planarm.errors", "planarm.scene", "planarm.model", "planarm_wire", "planarm_sim"},
     "planarm.arm_findings": {"planarm.link", "planarm.model", "planarm.plan", "planarm_wire"},
-    "planarm.analysis": {"planarm.errors", "planarm_wire"},
+    "planarm.analysis": {"planarm.errors", *WIRE},
     "planarm.report": {"planarm.errors", "planarm_wire"},
     "planarm.plan": {
         "planarm.scene",
