@@ -115,6 +115,15 @@ ALLOWED: dict[str, set[str]] = {
         "planarm.stepping",
         "planarm_wire",
     },
+    "planarm.timing_flow": {
+        "planarm.errors",
+        "planarm.scene",
+        "planarm.model",
+        "planarm.stepping",
+        "planarm.analysis",
+        "planarm.plan_file",
+        "planarm_wire",
+    },
     "planarm.experiments": {
         "planarm.errors",
         "planarm.scene",
@@ -133,6 +142,7 @@ ALLOWED: dict[str, set[str]] = {
         "planarm.report",
         "planarm.experiments",
         "planarm.pipeline",
+        "planarm.timing_flow",
         "planarm.output",
         "planarm.plan_file",
         "planarm.warm_up",

@@ -117,6 +117,27 @@ def test_a_recording_of_something_else_is_not_aligned(tmp_path):
     assert not report.aligned or report.counts
 
 
+def test_a_motion_that_paused_has_its_steps_counted_and_is_told_once(tmp_path):
+    train = two_joints()
+    middle_ps = train.joints[0][150].rise_ps
+    paused = train._each(lambda p: replace(p, rise_ps=p.rise_ps + (700_000_000_000 if p.rise_ps > middle_ps else 0)))
+    report = judged(tmp_path, "planarm.vcd", paused.without(1, 250), train)
+    assert report.counts == {"stretched": 1, "missing": 1}
+    missing = next(f for f in report.findings if f.kind == "missing")
+    assert missing.joint == 2
+    assert [joint.missing + joint.extra for joint in report.joints] == [0, 1]
+
+
+@pytest.mark.parametrize("gone", [2, 8])
+def test_several_steps_missing_in_a_row_are_each_told(gone, tmp_path):
+    train = two_joints()
+    spoiled = train
+    for _ in range(gone):
+        spoiled = spoiled.without(0, 100)
+    report = judged(tmp_path, "planarm.vcd", spoiled, train)
+    assert report.counts == {"missing": gone}
+
+
 def test_an_interrupt_that_held_an_edge_up_is_named(tmp_path):
     train = two_joints()
     late = train.changed(0, 100, rise_ps=train.joints[0][100].rise_ps + 5_000_000)

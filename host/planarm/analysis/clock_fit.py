@@ -7,6 +7,7 @@ recording of a board until its seconds are scaled.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from itertools import pairwise
 
 import numpy as np
 import numpy.typing as npt
@@ -24,6 +25,8 @@ MOST_SKIPPED = 4
 OPENING_STEPS = 400
 MOST_PAIRS = 1 << 18
 _ALIKE_PS = 2000.0
+_PAUSE_PS = 10**9
+_FEW_PAIRS = 100
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,7 +75,10 @@ class ClockFitter:
         if len(planned) < 2 or 2 * self._every * len(planned) < self._state_steps():
             start = float(seen[0] - planned[0]) if len(planned) else 0.0
             return ClockFit(start, 1.0, aligned=len(planned) == 1 == len(self.schedule.times_ps))
-        start, scale = robust_line(planned, seen)
+        part = steady_part(planned, seen)
+        start, scale = robust_line(planned[part], seen[part])
+        if abs(scale - 1.0) > WORST_CLOCK:  # no clock: the motion was stretched
+            start, scale = float(seen[part][0] - planned[part][0]), 1.0
         return ClockFit(start, scale, aligned=True)
 
     def _state_steps(self) -> int:
@@ -142,6 +148,16 @@ def _try_opening(times_ps: Ints, schedule: Schedule, plan: int, seen: int) -> _O
     start_ps, scale = robust_line(planned_ps, seen_ps)
     error_ps = float(np.median(np.abs(seen_ps - start_ps - scale * planned_ps)))
     return _Opening(plan, seen, found, error_ps if abs(scale - 1.0) <= WORST_CLOCK else np.inf)
+
+
+def steady_part(planned: Ints, seen: Ints) -> slice:
+    """Return the stretch to which a clock can be fitted: up to the first pause, or the longest where that is short."""
+    gaps = np.diff(seen) - np.diff(planned)
+    pauses = np.flatnonzero(gaps > WORST_CLOCK * np.diff(planned) + _PAUSE_PS) + 1
+    borders = [0, *pauses.tolist(), len(planned)]
+    parts = [slice(a, b) for a, b in pairwise(borders)]
+    longest = max(parts, key=lambda part: part.stop - part.start)
+    return parts[0] if parts[0].stop >= min(_FEW_PAIRS, longest.stop - longest.start) else longest
 
 
 def robust_line(planned: Ints, seen: Ints) -> tuple[float, float]:

@@ -8,16 +8,13 @@ import numpy as np
 import numpy.typing as npt
 
 from planarm.analysis.capture import PS_PER_S
-from planarm.analysis.clock_fit import ClockFit
+from planarm.analysis.clock_fit import WORST_CLOCK, ClockFit
 from planarm.analysis.spread import SpreadBins
 from planarm.analysis.step_match import EXTRA, MatchState, Schedule, match_steps
 
 Ints = npt.NDArray[np.int64]
 Floats = npt.NDArray[np.float64]
 Directions = npt.NDArray[np.int8]
-
-DRIFT = 2e-4
-"""How far the fitted clock may be off over one interval: resonators wander by some ten parts in a million."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -94,7 +91,7 @@ class JointJudge:
         if self.schedule is None or self._state is None or self._clock is None:
             none = np.empty(0, np.int64)
             return Judged(times_ps, np.empty(0), none, none, none)
-        matched = match_steps(times_ps, self.schedule, self._clock.scale, DRIFT, self._state)
+        matched = match_steps(times_ps, self.schedule, self._clock.scale, WORST_CLOCK, self._state)
         found = matched.planned != EXTRA
         numbers, times = matched.planned[found], times_ps[found]
         due_ps = self._clock.start_ps + self._clock.scale * self.schedule.times_ps[numbers]

@@ -1,8 +1,9 @@
 """Holds a joint's steps against its schedule, one after the other, and finds what is missing, extra or out of place.
 
 The next scheduled step is expected one scaled scheduled interval after the last one that was found. A step within
-0.4 of the smaller neighbouring interval of that moment is it; one before is extra; a later one says that the scheduled
-step is missing. So one defect stays one defect, and a clock that runs fast or slow carries nothing away.
+0.4 of the smaller neighbouring interval of that moment is it; one before is extra. One after is held against the next
+few scheduled steps: where it is one of them, those before are missing; where it is none, the motion paused and the step
+is the one that was expected. So one defect stays one defect, and neither a pause nor a fast or slow clock carries on.
 """
 
 from __future__ import annotations
@@ -19,6 +20,9 @@ Directions = npt.NDArray[np.int8]
 
 NEAR = 0.4
 """Share of the smaller neighbouring interval within which a step is the scheduled one."""
+
+MOST_MISSING = 8
+"""How many steps in a row may be missing; a longer gap is a pause."""
 
 EXTRA = -1
 ALONE_PS = 10**12
@@ -87,28 +91,40 @@ def match_steps(times_ps: Ints, schedule: Schedule, scale: float, drift: float, 
 
 
 @kernel
+def _lateness(now: int, plan: Ints, n: int, scale: float, drift: float, places: Ints) -> tuple[float, float]:
+    """Return how much later than step n was due a step came, and how much may be."""
+    since = plan[n] - places[_PLANNED_PS]
+    before = plan[n] - plan[n - 1] if n > 0 else ALONE_PS
+    after = plan[n + 1] - plan[n] if n + 1 < len(plan) else ALONE_PS
+    late = np.float64(now - places[_SEEN_PS]) - since * scale
+    return late, NEAR * min(before, after) * scale + drift * since
+
+
+@kernel
 def _match(times: Ints, plan: Ints, scale: float, drift: float, places: Ints, planned: Ints, missing: Ints) -> int:
     n = places[_NEXT]
     size = len(plan)
     gone = 0
     for k in range(len(times)):
         planned[k] = EXTRA
-        while n < size:
-            since = plan[n] - places[_PLANNED_PS]
-            before = plan[n] - plan[n - 1] if n > 0 else ALONE_PS
-            after = plan[n + 1] - plan[n] if n + 1 < size else ALONE_PS
-            room = NEAR * min(before, after) * scale + drift * since
-            late = np.float64(times[k] - places[_SEEN_PS]) - since * scale
-            if late < -room:
-                break
-            if late <= room:
-                planned[k] = n
-                places[_SEEN_PS] = times[k]
-                places[_PLANNED_PS] = plan[n]
-                n += 1
-                break
-            missing[gone] = n
+        if n >= size:
+            continue
+        late, room = _lateness(times[k], plan, n, scale, drift, places)
+        if late < -room:
+            continue
+        skipped = 0
+        while late > room and skipped < MOST_MISSING and n + skipped + 1 < size:
+            skipped += 1
+            late, room = _lateness(times[k], plan, n + skipped, scale, drift, places)
+        if abs(late) > room:  # none of the next: a pause
+            skipped = 0
+        for passed in range(n, n + skipped):
+            missing[gone] = passed
             gone += 1
-            n += 1
+        n += skipped
+        planned[k] = n
+        places[_SEEN_PS] = times[k]
+        places[_PLANNED_PS] = plan[n]
+        n += 1
     places[_NEXT] = n
     return gone

@@ -7,7 +7,7 @@ a chunk, the plan's steps and the listed findings, whatever the recording's leng
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -40,6 +40,9 @@ MOST_FINDINGS = 1000
 CURVE_BINS = 400
 DEFAULT_TOLERANCE_US = 1.0
 
+STRETCHED_SHARE = 0.05
+"""With more than this share of the steps off time, the motion was held, slowed or starved: that is one finding."""
+
 
 @dataclass(frozen=True, slots=True)
 class PulseLimits:
@@ -62,7 +65,8 @@ class Finding:
     """One thing that is not as it should be.
 
     Attributes:
-        kind: missing, extra, late, early, direction, or the broken rule: step_high, step_low, dir_setup, dir_hold.
+        kind: missing, extra, late, early, direction, stretched (the motion as a whole does not keep the plan's time),
+            or the broken rule: step_high, step_low, dir_setup, dir_hold.
         joint: from 1.
         time_s: moment in the recording; where a step is missing, when it was due.
         path_s: moment of the plan, None without one.
@@ -207,6 +211,27 @@ def analyse(
     return _judge(capture, channels, schedules, rules, survey, survey.begin_ps, notice)
 
 
+def recorded_schedules(capture: Capture, channels: ChannelMap) -> list[Schedule]:
+    """Return a recording's own steps as schedules, so that another one can be held against it.
+
+    Raises:
+        CaptureError: the recording is damaged or has no step.
+    """
+    state = ScanState(channels.joints)
+    limits = np.zeros((channels.joints, len(RULES)), np.int64)
+    parts = [scan_chunk(chunk, channels.roles, limits, state) for chunk in capture.chunks(channels.names)]
+    schedules = [
+        Schedule(
+            np.concatenate([part.times_ps[j] for part in parts] or [np.empty(0, np.int64)]),
+            np.concatenate([part.directions[j] for part in parts] or [np.empty(0, np.int8)]),
+        )
+        for j in range(channels.joints)
+    ]
+    if not any(len(schedule.times_ps) for schedule in schedules):
+        raise CaptureError(f"{capture.path}: no STEP line rises; map the joints' lines with --map")
+    return schedules
+
+
 def _survey(capture: Capture, channels: ChannelMap, schedules: Sequence[Schedule] | None, notice: Notice) -> Survey:
     """Read the recording once for its extent, the counts, and the clock."""
     survey = Survey(steps=[0] * channels.joints)
@@ -264,6 +289,7 @@ def _judge(
         notice("judge", min(0.99, float(chunk.times_ps[-1] - begin_ps) / max(survey.end_ps - begin_ps, 1)))
     for judge in judges:
         book.missing(judge, judge.rest())
+    book.settle(sum(survey.steps))
     notice("judge", 1.0)
     aligned = clock is None or clock.aligned
     return TimingReport(
@@ -366,6 +392,18 @@ class _Book:
             return
         for due_ps in judge.schedule.times_ps[planned].tolist():
             self._add("missing", judge.joint, round(self.clock.start_ps + self.clock.scale * due_ps))
+
+    def settle(self, steps: int) -> None:
+        """Say once that the motion as a whole does not keep time, where that is so."""
+        off = [key for key in self._counts if key[0] in ("late", "early")]
+        if sum(self._counts[key] for key in off) <= STRETCHED_SHARE * steps:
+            return
+        first = min((f for f in self.findings if f.kind in ("late", "early")), key=lambda f: f.time_s)
+        for key in off:
+            del self._counts[key]
+        self.findings = [f for f in self.findings if f.kind not in ("late", "early")]
+        self.findings.append(replace(first, kind="stretched", cause=None))
+        self._counts["stretched", first.joint - 1] = 1
 
     def _add(
         self,

@@ -95,6 +95,7 @@ def build_parser() -> argparse.ArgumentParser:
     _add_stream(commands)
     _add_emulate(commands)
     _add_compare(commands)
+    _add_timing(commands)
     return parser
 
 
@@ -159,6 +160,33 @@ def _add_compare(commands: Commands) -> None:
     )
     command.add_argument("--seeds", type=_count, default=200, metavar="N", help="draws of Chaos A* (default: 200)")
     _add_json(command)
+
+
+def _add_timing(commands: Commands) -> None:
+    command = commands.add_parser(
+        "timing",
+        help="judge a recording of the STEP and DIR lines",
+        description="planarm timing CAPTURE: hold a VCD or CSV recording against a plan and a driver's rules.\n"
+        "planarm timing diff A B: hold recording B against recording A.",
+        epilog=EXIT_CODES,
+    )
+    command.add_argument("captures", metavar="CAPTURE", nargs="+", help="VCD, or CSV of Saleae Logic 2 or sigrok")
+    command.add_argument("--plan", metavar="FILE.plan", help="the plan that was executed")
+    command.add_argument("--driver", metavar="NAME", help="whose rules hold (default: the plan's; a4988, drv8825 ...)")
+    command.add_argument(
+        "--map", metavar="LINE=CHANNEL", action="append", help="step1=..., dir1=...; default: pin names"
+    )
+    command.add_argument("--tolerance-us", type=_positive, default=1.0, metavar="US", help="off time beyond (1)")
+    command.add_argument("--junit", metavar="FILE.xml", help="also write the verdict as JUnit XML")
+    _add_json(command)
+
+
+def _positive(text: str) -> float:
+    """Return a number above 0."""
+    value = float(text)
+    if not 0.0 < value < float("inf"):
+        raise argparse.ArgumentTypeError(f"{text} is not above 0")
+    return value
 
 
 def _count(text: str) -> int:
