@@ -155,16 +155,13 @@ def _package_folders(package: str) -> list[Path]:
 
 def _closure(module: str, source: Path) -> dict[str, Path]:
     """Return the file, by dotted module name, of everything that can take part in the module's compiled code."""
-    package = module.partition(".")[0]
-    roots = {package: _package_folders(package), "planarm_wire": [Path(__file__).parent]}
     found = {module: source} if source.is_file() else {}
     waiting = list(found.items())
     while waiting:
-        for imported in _imported_modules(*waiting.pop()):
-            file = _find_module(imported, roots)
-            if file is not None and imported not in found:
-                found[imported] = file
-                waiting.append((imported, file))
+        for imported in _imported_modules(*waiting.pop(), module.partition(".")[0]):
+            if imported[0] not in found:
+                found[imported[0]] = imported[1]
+                waiting.append(imported)
     return found
 
 
@@ -174,12 +171,16 @@ def _module_name(package: str, folder: Path, path: Path) -> str:
 
 
 @functools.cache
-def _imported_modules(name: str, path: Path) -> tuple[str, ...]:
-    """Return the dotted names that a module's imports at the left margin may mean; some are no modules."""
-    return tuple(_read_imports(name, _text(path)))
+def _imported_modules(name: str, path: Path, package: str) -> tuple[tuple[str, Path], ...]:
+    """Return the modules of `package` and of `planarm_wire`, with their files, that imports at the left margin name."""
+    roots = {package: _package_folders(package), "planarm_wire": [Path(__file__).parent]}
+    named = dict.fromkeys(_read_imports(name, _text(path)))
+    files = ((imported, _find_module(imported, roots)) for imported in named if imported.partition(".")[0] in roots)
+    return tuple((imported, file) for imported, file in files if file is not None)
 
 
 def _read_imports(name: str, text: bytes) -> Iterator[str]:
+    """Yield the dotted names that a module's imports may mean; some are no modules."""
     for base, names, plain in _IMPORT.findall(text):
         if plain:
             targets = [n.decode() for n in _NAME.findall(plain)]
