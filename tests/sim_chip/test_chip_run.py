@@ -235,6 +235,26 @@ def test_what_is_not_modelled_is_noted_once_with_its_place():
     assert chip.registers[3] == 0x80
 
 
+@pytest.mark.parametrize(
+    ("instruction", "register"),
+    [
+        *[(f"{m} 0x0C, 0", "0x2C") for m in ("sbi", "cbi", "sbic", "sbis")],
+        ("in r0, 0x2C", "SPCR"),
+        ("out 0x30, r0", "ACSR"),
+        ("lds r0, 0xBC", "TWCR"),
+        ("sts 0xBC, r0", "TWCR"),
+        ("ldd r0, Z+1", "TWBR"),
+        ("std Z+1, r0", "TWBR"),
+        ("ld r0, Z+", "0xB7"),
+        ("st -Z, r0", "ASSR"),
+    ],
+)
+def test_every_kind_of_access_is_noted_with_its_place(instruction, register):
+    chip = Chip(assemble(f"ldi r30, 0xB7\nldi r31, 0\nnop\n{instruction}\nbreak\nbreak"))
+    chip.run_to(100)
+    assert [(touch.register, touch.pc) for touch in chip.unmodelled()] == [(register, 3)]
+
+
 def test_modes_that_are_not_modelled_are_noted():
     # Power-down sleep (SM2:0 = 2) and the USART as SPI master (UMSEL0 = 3).
     chip = Chip(assemble("ldi r16, 5\nout 0x33, r16\nldi r16, 0xC0\nsts 0xC2, r16\nsleep"))

@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as some
 
+from planarm_sim.cpu import layout as at
 from planarm_sim.cpu.chip import Chip, Parity, StopCause
 from planarm_sim.errors import UsageError
 from sim_chip.avr_assembler import assemble
@@ -335,3 +336,23 @@ def test_thousands_of_queued_frames_arrive():
     chip.run_to(1000 + 640 * 10_001)
     assert chip.registers[24] | chip.registers[25] << 8 == 10_000
     assert chip.registers[20] == sum(n & 0xFF for n in range(10_000)) & 0xFF
+
+
+def test_in_multi_processor_mode_only_addresses_come_in():
+    # Nine data bits, the ninth tells addresses from data (20.9). MPCM0 is on; of four frames two are addresses.
+    source = f"""
+        ldi r16, 3
+        sts {UBRR0L}, r16
+        ldi r16, 1
+        sts {UCSR0A}, r16       ; MPCM0
+        ldi r16, 0x14
+        sts {UCSR0B}, r16       ; RXEN0, UCSZ02
+    wait: rjmp wait
+    """
+    chip = Chip(assemble(source))
+    for n, character in enumerate((0x101, 0x002, 0x003, 0x104)):
+        chip.push_rx(1000 + 1000 * n, 64, character, data_bits=9)
+    chip.run_to(6000)
+    state = chip.snapshot().state
+    assert state[at.RX_COUNT] == 2
+    assert [int(state[at.RX_ENTRY_0]), int(state[at.RX_ENTRY_1])] == [0x101, 0x104]

@@ -8,6 +8,8 @@ Cycles: AVR Instruction Set Manual, column AVRe, 16-bit program counter.
 
 from __future__ import annotations
 
+import numpy as np
+
 from planarm_sim.cpu import access as io
 from planarm_sim.cpu import opcodes as op
 from planarm_sim.cpu.access import look_early, note_access, note_turn
@@ -38,8 +40,6 @@ from planarm_sim.cpu.service import AT_BAD_OPCODE, AT_BREAK, FLASH_WRITE, RUNNIN
 from planarm_sim.cpu.tables import WRITES_WORD
 
 PC_MASK = 0x3FFF
-CODE_MASK = 0x7FFF
-"""Covers every place that a program counter can have, so that no index is taken for a negative one."""
 FLASH_MASK = 0x7FFF
 SRAM_BYTES = SRAM_END - SRAM_START
 Z_LOW, Z_HIGH = 30, 31
@@ -72,7 +72,7 @@ def run(st: State, memory: Bytes, words: State, code: State, flash: Bytes, targe
             pc = int(st[PC])
             cycle = int(st[CYCLE])
             sreg = int(st[SREG_BITS])
-        word = code[pc & CODE_MASK]
+        word = code[np.uint64(pc)]  # unsigned, so that it is not taken for a place counted from the end
         operation = word & 0xFF
         pc += 1
         cycle += 1
