@@ -9,7 +9,6 @@ from collections.abc import Sequence
 from planarm_sim.emulate import Emulation, Watch, emulate
 from planarm_sim.errors import SimError
 from planarm_sim.insight import Insight
-from planarm_wire import messages
 
 __all__ = ["add_watch_options", "main", "summary", "watch_of"]
 
@@ -31,7 +30,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--link", metavar="PATH", help="make PATH a link to the terminal")
     add_watch_options(parser)
     parser.add_argument("--speed", choices=("real", "max"), default="real", help="default: %(default)s")
-    parser.add_argument("--baud", type=int, default=messages.BAUD, help="of the serial line; default: %(default)s")
+    parser.add_argument("--baud", type=int, help="of the serial line; default: what the host sets")
+    parser.add_argument("--usb", choices=("16u2", "direct"), default="16u2", help="the board's USB bridge, or none")
     parser.add_argument("--seconds", type=float, help="emulated time to run; default: until stopped")
     parser.add_argument("--no-reset-on-open", action="store_true", help="opening the terminal does not reset the board")
     options = parser.parse_args(arguments)
@@ -43,6 +43,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             watch=watch_of(options),
             speed=options.speed,
             baud=options.baud,
+            usb=options.usb,
             seconds=options.seconds,
             reset_on_open=not options.no_reset_on_open,
             announce=_print_line,

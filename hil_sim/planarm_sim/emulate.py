@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from types import FrameType
 
-from planarm_sim.board import CLOCK_HZ, Uno
+from planarm_sim.board import CLOCK_HZ, Uno, Usb
 from planarm_sim.bridge import BOOT_S, Bridge, BridgeCounts, Clock, Line, Speed, WallClock
 from planarm_sim.cpu.chip import StopCause
 from planarm_sim.debug import GdbServer
@@ -63,7 +63,8 @@ def emulate(
     link: str | Path | None = None,
     watch: Watch = NO_WATCH,
     speed: Speed = "real",
-    baud: int = messages.BAUD,
+    baud: int | None = None,
+    usb: Usb = "16u2",
     seconds: float | None = None,
     reset_on_open: bool = True,
     announce: Callable[[str], None],
@@ -77,7 +78,8 @@ def emulate(
         link: path at which the terminal can be opened, too.
         watch: what to record, and whether a debugger may attach.
         speed: "real" or "max"; see `planarm_sim.bridge.bridge`.
-        baud: rate of the serial line; a pseudo-terminal does not tell what its host sets.
+        baud: rate of the serial line; None follows the host, and is 250,000 until it sets another.
+        usb: "16u2": with the delays and limits of the board's USB bridge; "direct": without.
         seconds: emulated time to run; None runs on.
         reset_on_open: reset the board whenever a host opens the terminal, as a Uno does.
         announce: takes the terminal's path as soon as it can be opened, before anything else.
@@ -95,11 +97,11 @@ def emulate(
         raise BridgeError(
             "this system has no pseudo-terminals; use planarm --port sim://, which needs none, or Linux or macOS"
         ) from error
-    uno = Uno(_load(image_path), baud=baud, bootloader=_load(bootloader))
+    uno = Uno(_load(image_path), baud=baud or messages.BAUD, usb=usb, bootloader=_load(bootloader))
     if watch.symbols is not None:
         load_elf(watch.symbols)  # what is wrong with it is told before anything is announced
     uno.run(cycles=1)  # compiles the chip, or loads it from the cache: a host that opens the terminal need not wait
-    with _stopped_by_signals() as stop, PtyLine(link) as line:
+    with _stopped_by_signals() as stop, PtyLine(link, uno.serial.baud) as line:
         announce(line.path)
         return run_board(
             uno,
@@ -110,6 +112,7 @@ def emulate(
             speed=speed,
             seconds=seconds,
             reset_on_open=reset_on_open,
+            follow_baud=baud is None,
             say=say,
         )
 
@@ -128,6 +131,7 @@ def run_board(
     speed: Speed = "real",
     seconds: float | None = None,
     reset_on_open: bool = True,
+    follow_baud: bool = False,
     say: Callable[[str], None],
 ) -> Emulation:
     """As `emulate`, with a board, a line, a clock and a way to stop it of the caller's."""
@@ -142,7 +146,14 @@ def run_board(
             debugger = stack.enter_context(GdbServer(watch.gdb_port, uno.debug_target))
             say(f"avr-gdb attaches by: target remote localhost:{debugger.port}")
         bridge = Bridge(
-            uno, line, clock, speed=speed, boot_s=BOOT_S if reset_on_open else None, say=say, after_run=sink.take
+            uno,
+            line,
+            clock,
+            speed=speed,
+            boot_s=BOOT_S if reset_on_open else None,
+            follow_baud=follow_baud,
+            say=say,
+            after_run=sink.take,
         )
         ended, failed = _run_to_the_end(uno, bridge, seconds, stop, debugger)
     insight = uno.insight() if watch.profile is not None else None

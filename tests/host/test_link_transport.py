@@ -1,6 +1,7 @@
 """Opening lines: every failure is one sentence that says what to do."""
 
 import array
+import contextlib
 import errno
 import fcntl
 import grp
@@ -17,6 +18,9 @@ from planarm.errors import LinkError
 from planarm.link import released_image as images
 from planarm.link import serial_transport
 from planarm.link.transport import open_transport
+from planarm_wire import messages
+from planarm_wire.codec import decode, encode
+from planarm_wire.framing import FrameDecoder, encode_frame
 
 TIOCGEXCL = 0x80045440  # Linux, asm-generic/ioctls.h: tells whether TIOCEXCL holds
 
@@ -34,9 +38,11 @@ def test_an_unknown_scheme_names_the_known_ones():
         open_transport("usb://1234")
 
 
-@pytest.mark.parametrize("url", ["sim://here", "sim:///x.hex", "sim://?hex=a", "sim://?image=a&speed=2"])
-def test_the_emulator_takes_an_image_and_nothing_else(url):
-    with pytest.raises(LinkError, match=r"takes sim:// or sim://\?image=PATH"):
+@pytest.mark.parametrize(
+    "url", ["sim://here", "sim:///x.hex", "sim://?hex=a", "sim://?image=a&speed=2", "sim://?usb=8u2"]
+)
+def test_the_emulator_takes_an_image_and_a_bridge_and_nothing_else(url):
+    with pytest.raises(LinkError, match=r"takes sim://, sim://\?image=PATH, sim://\?usb=16u2"):
         open_transport(url)
 
 
@@ -129,3 +135,13 @@ def test_the_wheel_comes_before_the_checkout(tmp_path, monkeypatch):
     assert images.released_image() == checkout
     wheel.write_text("")
     assert images.released_image() == wheel
+
+
+def test_the_emulators_bridge_passes_a_session_on():
+    with contextlib.closing(open_transport("sim://?usb=16u2")) as line:
+        line.clock.wait_until(0.02)  # the board listens
+        line.write(encode_frame(0, *encode(messages.Hello(messages.PROTOCOL_VERSION, host_nonce=7))))
+        answer = line.read(100, 1.0)
+        assert line.clock.now_s() % 4.096e-3 < 0.5e-3, "it came with a tick of the bridge's timer"
+        (frame,) = FrameDecoder().feed(answer)
+        assert decode(frame.type_code, frame.payload).host_nonce == 7

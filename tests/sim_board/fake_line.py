@@ -29,6 +29,7 @@ class FakeLine:
         self.room = room
         self.waits: list[float] = []
         self.most_taken = 0
+        self.baud_set: int | None = None
 
     def _catch_up(self) -> None:
         while self.acts and self.acts[0][0] <= self.clock.time_s - self.start_s:
@@ -48,6 +49,9 @@ class FakeLine:
         self._catch_up()
         openings, self.openings = self.openings, 0
         return openings > 0
+
+    def baud(self) -> int | None:
+        return self.baud_set
 
     def read(self, most: int) -> bytes:
         self._catch_up()

@@ -1,7 +1,7 @@
 """Optiboot, the Uno's boot loader, built from the sources in Debian's package arduino-core-avr.
 
 The image in that package does not fit: its compiler made 532 bytes of it, and the Uno's boot section has 512. The
-options below bring the same source down to what fits.
+options below bring the same source down to what fits; test_sim_bootloader.py tells what can be done with the image.
 """
 
 import shutil

@@ -6,8 +6,9 @@ import pytest
 
 from planarm_sim import Uno
 from planarm_sim.board import CLOCK_HZ
+from planarm_sim.board.usb_bridge import RING_BYTES
 from planarm_sim.bridge import Bridge
-from planarm_sim.bridge.bridge import BRIDGE_RING_BYTES, GIVE_UP_LAG_S, LIVELY_SLICE_S, MAX_CHUNK_S, QUIET_SLICE_S
+from planarm_sim.bridge.bridge import GIVE_UP_LAG_S, LIVELY_SLICE_S, MAX_CHUNK_S, QUIET_SLICE_S
 from sim_board.fake_line import FakeClock, FakeLine
 
 DATA = Path(__file__).parent / "data"
@@ -94,7 +95,7 @@ def test_the_host_is_held_back_beyond_the_ring():
 
     rig.bridge._after_run = watch
     rig.bridge.run(seconds=0.03)
-    assert BRIDGE_RING_BYTES - 10 <= fullest <= BRIDGE_RING_BYTES
+    assert RING_BYTES - 10 <= fullest <= RING_BYTES
     assert rig.line.inbox, "20 ms carry 500 of the 1000 bytes"
     rig.bridge.run(seconds=0.03)
     assert rig.line.text == RESET + bytes([10] * 1000)

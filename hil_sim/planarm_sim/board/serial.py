@@ -1,24 +1,27 @@
 """The host's end of the Uno's serial line, in emulated time.
 
 Frames are 8N1, ten bits a byte (ATmega328P datasheet, 20.4). Host to board, bytes follow one another without
-gaps; board to host, a byte can be read once its stop bit has passed. The host samples in the middle of its own
-bits, so a program that set another baud rate is received as garbage here as well.
+gaps; board to host, a byte can be read once its stop bit has passed, or when the USB bridge has passed it on. The far
+end samples in the middle of its own bits, so a program that set another baud rate is received as garbage here as well.
 """
 
 from __future__ import annotations
 
 from collections import deque
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal, TypeAlias, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
 from planarm_sim.board.serial_log import FROM_BOARD, TO_BOARD, SerialLog, SerialLogState
+from planarm_sim.board.usb_bridge import PACKET_BYTES, RING_BYTES, UsbBridge, UsbState, bridge_bit_cycles
 from planarm_sim.cpu.chip import Chip
 from planarm_sim.errors import UsageError
 
-__all__ = ["CLOCK_HZ", "FRAME_BITS", "SerialPort", "SerialState"]
+__all__ = ["CLOCK_HZ", "FRAME_BITS", "SerialPort", "SerialState", "Usb"]
+
+Usb: TypeAlias = Literal["direct", "16u2"]
 
 CLOCK_HZ = 16_000_000
 FRAME_BITS = 10
@@ -37,6 +40,7 @@ class SerialState:
     received: bytes
     framing_errors: int
     log: SerialLogState
+    usb: UsbState | None
 
 
 class SerialPort:
@@ -45,10 +49,18 @@ class SerialPort:
     Args:
         chip: the chip whose RXD and TXD this line is wired to.
         baud: the host's rate, bits a second.
+        usb: what the host's end is. "direct": a UART of its own, exactly at its rate, whose bytes are there when their
+            stop bit has passed. "16u2": the board's USB bridge; see `usb_bridge`.
+
+    Attributes:
+        bridge: the USB bridge; None when the line is direct.
     """
 
-    def __init__(self, chip: Chip, baud: int) -> None:
+    def __init__(self, chip: Chip, baud: int, usb: Usb = "direct") -> None:
+        if usb not in get_args(Usb):
+            raise UsageError(f"usb is {usb!r}; a serial line is {' or '.join(map(repr, get_args(Usb)))}")
         self._chip = chip
+        self.bridge = UsbBridge() if usb == "16u2" else None
         self._burst_start = 0  # cycle at which the bytes written without a gap began
         self._burst_bytes = 0
         self._ends: deque[int] = deque()  # ends of the stop bits still to come
@@ -70,9 +82,11 @@ class SerialPort:
     def baud(self, value: int) -> None:
         if not 300 <= value <= MAX_BAUD:
             raise UsageError(f"baud is {value}; a 16 MHz Uno takes 300 to {MAX_BAUD}")
+        # Cycles per bit as a ratio: exact, so that no rounding adds up.
+        bit_cycles = (CLOCK_HZ, value) if self.bridge is None else (bridge_bit_cycles(value), 1)
         if self._burst_bytes:
             self._burst_start, self._burst_bytes = self._line_free_cycle(), 0
-        self._baud = value
+        self._baud, self._bit_cycles = value, bit_cycles
 
     @property
     def pending(self) -> int:
@@ -87,6 +101,29 @@ class SerialPort:
         return self._line_free_cycle()
 
     @property
+    def room(self) -> int:
+        """Bytes that the host can hand over now; the USB bridge takes no more than its ring and one packet hold."""
+        taken_ahead = RING_BYTES if self.bridge is None else RING_BYTES + PACKET_BYTES
+        return max(0, taken_ahead - self.pending)
+
+    @property
+    def host_takes(self) -> bool:
+        """Whether the host fetches what the USB bridge has for it; a direct line is always read.
+
+        Raises:
+            UsageError: set on a direct line.
+        """
+        return self.bridge is None or self.bridge.host_takes
+
+    @host_takes.setter
+    def host_takes(self, value: bool) -> None:
+        if self.bridge is None:
+            raise UsageError("a direct line has nobody who could leave bytes lying; make the board with usb='16u2'")
+        self.bridge.advance(self._chip.cycle)
+        self.bridge.host_takes = value
+        self.bridge.advance(self._chip.cycle)
+
+    @property
     def framing_errors(self) -> int:
         """Bytes received so far whose stop bit was not where the host looked: the baud rates differ."""
         return self._framing_errors
@@ -95,7 +132,7 @@ class SerialPort:
         """Send bytes to the board; the first starts now, or after those still on their way."""
         if self._line_free_cycle() < self._chip.cycle:
             self._burst_start, self._burst_bytes = self._chip.cycle, 0
-        bit_cycles = CLOCK_HZ / self._baud
+        bit_cycles = self._bit_cycles[0] / self._bit_cycles[1]
         for byte in data:
             start = self._line_free_cycle()
             self._chip.push_rx(start, bit_cycles, byte)
@@ -105,12 +142,14 @@ class SerialPort:
 
     def read(self) -> bytes:
         """Take everything received so far."""
+        self._fetch()
         data = bytes(self._received)
         self._received.clear()
         return data
 
     def peek(self) -> bytes:
         """Everything received so far, left in place."""
+        self._fetch()
         return bytes(self._received)
 
     def collect(self) -> None:
@@ -120,10 +159,20 @@ class SerialPort:
             return
         ends = frames["cycle"]
         self._log.extend(ends - FRAME_BITS * frames["bit_cycles"].astype(np.int64), ends, FROM_BOARD, frames["byte"])
-        if np.all(frames["bit_cycles"].astype(np.int64) * self._baud == CLOCK_HZ):
-            self._received += frames["byte"].astype(np.uint8).tobytes()
-        else:
-            self._sample(frames["byte"].astype(np.int64), frames["bit_cycles"])
+        data = frames["byte"].astype(np.uint8)
+        cycles, per = self._bit_cycles
+        if np.any(frames["bit_cycles"].astype(np.int64) * per != cycles):
+            heard, data = self._sample(frames["byte"].astype(np.int64), frames["bit_cycles"])
+            ends = ends[heard]
+        if self.bridge is None:
+            self._received += data.tobytes()
+            return
+        for end, byte in zip(ends.tolist(), data.tolist(), strict=True):
+            self.bridge.receive(end, byte)
+
+    def _fetch(self) -> None:
+        if self.bridge is not None:
+            self._received += self.bridge.fetch(self._chip.cycle)
 
     def snapshot(self) -> SerialState:
         """Copy the line's state."""
@@ -135,11 +184,20 @@ class SerialPort:
             bytes(self._received),
             self._framing_errors,
             self._log.snapshot(),
+            self.bridge.snapshot() if self.bridge is not None else None,
         )
 
     def restore(self, state: SerialState) -> None:
-        """Go back to `state`."""
-        self._baud = state.baud
+        """Go back to `state`, of a line of the same kind.
+
+        Raises:
+            UsageError: it is of the other kind.
+        """
+        if (state.usb is None) != (self.bridge is None):
+            raise UsageError("a snapshot of a board with another usb= cannot be restored here")
+        if self.bridge is not None and state.usb is not None:
+            self.bridge.restore(state.usb)
+        self.baud = state.baud
         self._burst_start, self._burst_bytes = state.burst_start, state.burst_bytes
         self._ends = deque(state.ends)
         self._received = bytearray(state.received)
@@ -167,14 +225,20 @@ class SerialPort:
 
     def _line_free_cycle(self) -> int:
         """First cycle after the last byte written; exact, so that no rounding adds up over a burst."""
-        return self._burst_start - (-self._burst_bytes * FRAME_BITS * CLOCK_HZ // self._baud)
+        cycles, per = self._bit_cycles
+        return self._burst_start - (-self._burst_bytes * FRAME_BITS * cycles // per)
 
-    def _sample(self, data: NDArray[Any], board_bit_cycles: NDArray[Any]) -> None:
-        """Receive frames as a UART of another rate does, each from its start bit on; the line is high after it."""
+    def _sample(self, data: NDArray[Any], board_bit_cycles: NDArray[Any]) -> tuple[NDArray[Any], NDArray[np.uint8]]:
+        """Receive frames as a UART of another rate does, each from its start bit on; the line is high after it.
+
+        Returns:
+            Which frames were heard at all, a mask of all of them, and the bytes that these became.
+        """
         waves = data << 1 | 0x200  # start bit, eight data bits from the lowest on, stop bit
-        ratios = CLOCK_HZ / self._baud / board_bit_cycles
+        ratios = self._bit_cycles[0] / self._bit_cycles[1] / board_bit_cycles
         places = np.minimum(((np.arange(FRAME_BITS) + 0.5) * ratios[:, None]).astype(np.int64), FRAME_BITS - 1)
         samples = waves[:, None] >> places & 1
-        samples = samples[samples[:, 0] == 0]  # else the middle of the host's start bit finds the line high: a spike
+        heard = samples[:, 0] == 0  # else the middle of the host's start bit finds the line high: a spike
+        samples = samples[heard]
         self._framing_errors += int(np.count_nonzero(samples[:, -1] == 0))
-        self._received += np.packbits(samples[:, 1:-1].astype(np.uint8), axis=1, bitorder="little").tobytes()
+        return heard, np.packbits(samples[:, 1:-1].astype(np.uint8), axis=1, bitorder="little")[:, 0]

@@ -6,6 +6,7 @@ says exactly when what happens, and two runs with the same calls are the same to
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from planarm_sim.board.pins import PINS, PinPlace, pin_place
-from planarm_sim.board.serial import CLOCK_HZ, FRAME_BITS, SerialPort, SerialState
+from planarm_sim.board.serial import CLOCK_HZ, FRAME_BITS, SerialPort, SerialState, Usb
 from planarm_sim.cpu.chip import EDGE_DTYPE, Chip, ResetCause, Snapshot, StopCause
 from planarm_sim.debug import GdbServer, Target, serve
 from planarm_sim.errors import LimitError, PinError, StoppedError, UsageError
@@ -102,6 +103,8 @@ class Uno:
     Args:
         image: the program.
         baud: the host's rate on the serial line; see `serial`.
+        usb: "direct": bytes reach the host when their stop bit has passed; "16u2": by way of the board's USB bridge,
+            with its delays and limits (see `board.usb_bridge`).
         bootloader: what is in the boot section, and where resets lead then (fuses as its size asks; BOOTRST). It may
             stand alone: None as `image` is a board to which nothing was uploaded yet.
 
@@ -109,7 +112,14 @@ class Uno:
         serial: the host's end of the serial line.
     """
 
-    def __init__(self, image: Image | None, *, baud: int = DEFAULT_BAUD, bootloader: Image | None = None) -> None:
+    def __init__(
+        self,
+        image: Image | None,
+        *,
+        baud: int = DEFAULT_BAUD,
+        usb: Usb = "direct",
+        bootloader: Image | None = None,
+    ) -> None:
         if bootloader is not None:
             boot = join_bootloader(image, bootloader)
             image = boot.image
@@ -121,47 +131,68 @@ class Uno:
         self._source = image.source
         self._symbols = image.symbols
         self._observer: Observer | None = None
-        self.serial = SerialPort(self._chip, baud)
+        self.serial = SerialPort(self._chip, baud, usb)
         self._edges: list[NDArray[Any]] = []
         self._listeners: list[Callable[[NDArray[Any]], None]] = []
         self._log_start_cycle = 0
         self._log_start_levels = self._levels()
 
     @classmethod
-    def from_hex(cls, path: str | Path, *, baud: int = DEFAULT_BAUD, bootloader: str | Path | None = None) -> Self:
+    def from_hex(
+        cls,
+        path: str | Path,
+        *,
+        baud: int = DEFAULT_BAUD,
+        usb: Usb = "direct",
+        bootloader: str | Path | None = None,
+    ) -> Self:
         """Power up with the program of an Intel HEX file, and a boot loader (either kind of file) if one is given.
 
         Raises:
             ImageError: the file cannot be loaded.
         """
-        return cls(load_hex(path), baud=baud, bootloader=_load_optional(bootloader))
+        return cls(load_hex(path), baud=baud, usb=usb, bootloader=_load_optional(bootloader))
 
     @classmethod
-    def from_elf(cls, path: str | Path, *, baud: int = DEFAULT_BAUD, bootloader: str | Path | None = None) -> Self:
+    def from_elf(
+        cls,
+        path: str | Path,
+        *,
+        baud: int = DEFAULT_BAUD,
+        usb: Usb = "direct",
+        bootloader: str | Path | None = None,
+    ) -> Self:
         """Power up with the program of an ELF executable, as avr-gcc links it.
 
         Raises:
             ImageError: the file cannot be loaded.
         """
-        return cls(load_elf(path), baud=baud, bootloader=_load_optional(bootloader))
+        return cls(load_elf(path), baud=baud, usb=usb, bootloader=_load_optional(bootloader))
 
     @classmethod
-    def from_file(cls, path: str | Path, *, baud: int = DEFAULT_BAUD, bootloader: str | Path | None = None) -> Self:
+    def from_file(
+        cls,
+        path: str | Path,
+        *,
+        baud: int = DEFAULT_BAUD,
+        usb: Usb = "direct",
+        bootloader: str | Path | None = None,
+    ) -> Self:
         """Power up with the program of a file of either kind.
 
         Raises:
             ImageError: the file cannot be loaded.
         """
-        return cls(load_image(path), baud=baud, bootloader=_load_optional(bootloader))
+        return cls(load_image(path), baud=baud, usb=usb, bootloader=_load_optional(bootloader))
 
     @classmethod
-    def from_bootloader(cls, path: str | Path, *, baud: int = DEFAULT_BAUD) -> Self:
+    def from_bootloader(cls, path: str | Path, *, baud: int = DEFAULT_BAUD, usb: Usb = "direct") -> Self:
         """Power up with a boot loader in an otherwise empty flash.
 
         Raises:
             ImageError: the file cannot be loaded, or no boot section holds it.
         """
-        return cls(None, baud=baud, bootloader=load_image(path))
+        return cls(None, baud=baud, usb=usb, bootloader=load_image(path))
 
     @property
     def cycle(self) -> int:
@@ -393,6 +424,25 @@ class Uno:
         if self._observer is not None:
             self._observer.begin(self.cycle)
             self._chip.watch(self._observer)
+
+    def fork(self, count: int) -> tuple[Self, ...]:
+        """Make `count` boards that go on from here, each on its own; this one stays as it is.
+
+        Recorded edges and bytes come along; what is driven from outside stays driven. Forks are not watched.
+
+        Raises:
+            UsageError: a negative count.
+        """
+        if count < 0:
+            raise UsageError(f"a board cannot be forked into {count}")
+        return tuple(self._twin() for _ in range(count))
+
+    def _twin(self) -> Self:
+        twin = copy.copy(self)
+        twin._chip, twin._edges, twin._observer = self._chip.fork(), list(self._edges), None
+        twin.serial = SerialPort(twin._chip, self.serial.baud, "direct" if self.serial.bridge is None else "16u2")
+        twin.serial.restore(self.serial.snapshot())
+        return twin
 
     def _run_to(self, target: int) -> None:
         cause = self._chip.run_to(target)

@@ -18,13 +18,11 @@ from typing import Literal
 
 from planarm_sim.board import CLOCK_HZ, Uno
 from planarm_sim.bridge.line import Clock, Line
+from planarm_sim.errors import UsageError
 
 __all__ = ["Bridge", "BridgeCounts", "Speed"]
 
 Speed = Literal["real", "max"]
-
-BRIDGE_RING_BYTES = 128
-"""Bytes taken from the host ahead of the line, as the ring of the Uno's USB bridge: beyond it the host waits."""
 
 LIVELY_SLICE_S = 0.000_25
 """Real speed: longest sleep while bytes are under way; 6 bytes at 250,000 baud."""
@@ -34,6 +32,8 @@ QUIET_SLICE_S = 0.002
 
 QUIET_AFTER_S = 0.005
 """The line counts as lively for so long after its last byte: a firmware's answer may be under way."""
+
+RESET_READ_BYTES = 4096
 
 BOOT_S = 0.1
 """How long an opened board stays in reset, by the clock. Hosts flush their buffers just after opening and would lose
@@ -73,6 +73,7 @@ class Bridge:
         line: the host's side.
         clock: the time that `speed` "real" follows.
         speed: see the module's text.
+        follow_baud: take the rate that the host sets, as the board's USB bridge does.
         boot_s: seconds by the clock for which the board stays in reset when a host opens the line, as a Uno does (its
             DTR line resets it); what the host sends meanwhile is lost. None: opening changes nothing.
         say: takes notices for the user, one line each.
@@ -87,6 +88,7 @@ class Bridge:
         *,
         speed: Speed = "real",
         boot_s: float | None = BOOT_S,
+        follow_baud: bool = False,
         say: Callable[[str], None],
         after_run: Callable[[], None],
     ) -> None:
@@ -95,6 +97,9 @@ class Bridge:
         self._clock = clock
         self._real = speed == "real"
         self._boot_s = boot_s
+        self._follow_baud = follow_baud
+        self._refused_baud: int | None = None
+        self._undelivered = b""
         self._boots_at_s: float | None = None  # in reset until then
         self._say = say
         self._after_run = after_run
@@ -144,10 +149,23 @@ class Bridge:
     def _notice_open(self) -> None:
         if self._line.opened():
             self._opened += 1
-            self._lost += len(self._uno.serial.read())  # nobody was there
+            self._lost += len(self._uno.serial.read()) + len(self._undelivered)  # nobody was there
+            self._undelivered = b""
             if self._boot_s is not None:
                 self._reset(self._boot_s)
         self._is_open = self._line.is_open()
+        if self._follow_baud and self._is_open:
+            self._set_baud(self._line.baud())
+
+    def _set_baud(self, baud: int | None) -> None:
+        """Take the rate that the host has set; one that the board's USB bridge cannot make is told once."""
+        if baud is None or baud in (self._uno.serial.baud, self._refused_baud):
+            return
+        try:
+            self._uno.serial.baud = baud
+        except UsageError as error:
+            self._refused_baud = baud
+            self._say(f"the host sets {baud} baud, the line stays at {self._uno.serial.baud}: {error}")
 
     def _reset(self, boot_s: float) -> None:
         uno = self._uno
@@ -160,7 +178,7 @@ class Bridge:
         """Let the clock run and the board stand still; the boot loader gets what the host sends."""
         now_s = self._clock.now_s()
         if now_s < boots_at_s:
-            self._line.read(BRIDGE_RING_BYTES)
+            self._line.read(RESET_READ_BYTES)
             self._line.wait(min(boots_at_s - now_s, QUIET_SLICE_S), for_bytes=False)
         else:
             self._boots_at_s = None
@@ -190,16 +208,23 @@ class Bridge:
         self._quiet_from_cycle = self._uno.cycle + round(QUIET_AFTER_S * CLOCK_HZ)
 
     def _to_line(self) -> None:
-        data = self._uno.serial.read()
+        fresh = self._uno.serial.read()
+        data = self._undelivered + fresh
         if not data:
             return
-        self._lively()
+        if fresh:
+            self._lively()
         taken = self._line.write(data) if self._is_open else 0  # else the next host would read old bytes
         self._to_host += taken
-        self._lost += len(data) - taken
+        if self._uno.serial.bridge is None or not self._is_open:
+            self._lost += len(data) - taken
+            self._undelivered = b""
+        else:  # a host that does not read leaves the rest in the USB bridge, which runs over
+            self._undelivered = data[taken:]
+            self._uno.serial.host_takes = not self._undelivered
 
     def _from_line(self) -> None:
-        data = self._line.read(BRIDGE_RING_BYTES - self._uno.serial.pending) if self._is_open else b""
+        data = self._line.read(self._uno.serial.room) if self._is_open else b""
         if data:
             self._from_host += len(data)
             self._uno.serial.write(data)
@@ -210,5 +235,5 @@ class Bridge:
             quiet = self._is_quiet()
             ahead_s = (self._uno.cycle - self._anchor_cycle) / CLOCK_HZ - (self._clock.now_s() - self._anchor_s)
             timeout_s = ahead_s + (QUIET_SLICE_S if quiet else LIVELY_SLICE_S)
-            room = self._uno.serial.pending < BRIDGE_RING_BYTES
+            room = self._uno.serial.room > 0
             self._line.wait(timeout_s, for_bytes=room)

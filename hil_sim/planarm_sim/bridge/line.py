@@ -35,6 +35,10 @@ class Line(Protocol):
         """Tell whether a host has opened the line since the last call, also if it has closed it again."""
         ...
 
+    def baud(self) -> int | None:
+        """Rate that the host has set, bits a second; None where that cannot be told."""
+        ...
+
     def read(self, most: int) -> bytes:
         """Take up to `most` bytes that the host sent; b"" when there are none now."""
         ...

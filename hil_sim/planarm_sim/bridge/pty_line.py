@@ -1,7 +1,8 @@
 """A pseudo-terminal that looks like the Uno's serial port: hosts open it by path, close it and open it again.
 
 A pty is not a UART: it takes any baud rate and ignores it, buffers some kilobytes, and has no DTR line. Pacing is
-therefore the bridge's work, and "a host opened the port" is seen by watching the terminal's file.
+therefore the bridge's work; "a host opened the port" is seen by watching the terminal's file, and the rate that the
+host set is read from the terminal's settings, where the system shows them (Linux; ioctl_tty(2), TCGETS2).
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Self
 
+from planarm_sim.bridge.baud import get_baud, set_baud
 from planarm_sim.bridge.open_watch import watch_opening
 from planarm_sim.errors import BridgeError
 
@@ -25,6 +27,7 @@ class PtyLine:
     """The master side of a pty in raw mode, with an optional link at a fixed path. A context manager.
 
     Args:
+        baud: rate that the terminal is set to until a host sets another.
         link: path of a symbolic link to make; a link there that a killed emulator left is replaced: it
             dangles, or names this very terminal, whose number was free again.
 
@@ -32,7 +35,7 @@ class PtyLine:
         BridgeError: no pty to be had, or `link` exists and is not such a leftover, or cannot be made.
     """
 
-    def __init__(self, link: str | Path | None = None) -> None:
+    def __init__(self, link: str | Path | None = None, baud: int | None = None) -> None:
         try:
             self._fd, slave = pty.openpty()
         except OSError as error:
@@ -44,6 +47,8 @@ class PtyLine:
         finally:
             os.close(slave)
         os.set_blocking(self._fd, False)
+        if baud is not None:
+            set_baud(self._fd, baud)
         self._watch = watch_opening(self.path)
         self._was_open = False
         self._poll = select.poll()
@@ -71,6 +76,10 @@ class PtyLine:
             return self._watch.opened()
         was_open, self._was_open = self._was_open, self.is_open()
         return self._was_open and not was_open
+
+    def baud(self) -> int | None:
+        """Rate that the host has set, bits a second; None where the system does not tell."""
+        return get_baud(self._fd)
 
     def read(self, most: int) -> bytes:
         """Take up to `most` bytes that the host sent; b"" when there are none, or when it has closed."""

@@ -7,6 +7,7 @@ start-up delay that the fuses select is not part of the count.
 
 from __future__ import annotations
 
+import copy
 from typing import Any, Final
 
 import numpy as np
@@ -343,6 +344,15 @@ class Chip:
         self._program = snapshot.program
         self._state[at.WATCH] = self._watcher is not None
         self._look_at_flash()
+
+    def fork(self) -> Chip:
+        """Make a chip that goes on from here on its own; nothing watches it."""
+        twin = copy.copy(self)
+        twin._state, twin._memory = self._state.copy(), self._memory.copy()
+        twin._words = twin._memory.view(np.int64)
+        twin._sram, twin._eeprom = twin._memory[:SRAM_BYTES], twin._memory[SRAM_BYTES:]
+        twin.watch(None)
+        return twin
 
     def unmodelled(self) -> tuple[FirstTouch, ...]:
         """Return the registers of parts that are not modelled which the program touched, by address."""

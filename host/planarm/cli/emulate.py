@@ -27,6 +27,7 @@ def execute(options: argparse.Namespace) -> int:
             link=options.link,
             watch=watch_of(options),
             speed=options.speed,
+            usb=options.usb,
             announce=lambda path: print(path, file=talk, flush=True),
             say=lambda text: print(f"note: {text}", file=sys.stderr, flush=True),
         )

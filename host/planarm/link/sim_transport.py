@@ -7,7 +7,7 @@ the baud rate in both directions, ten bits a byte.
 
 import math
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 from planarm.errors import LinkError
 from planarm.link.arm_record import ArmSetup
@@ -42,14 +42,21 @@ class EmulatorClock:
 class SimTransport:
     """A line to an Uno emulated from a flash image; `pins` shows its edges, `uno` is the board itself.
 
-    With a setup drivers, motors and an arm stand around it, and `arm` shows what they do.
+    With a setup drivers, motors and an arm stand around it, and `arm` shows what they do. `usb` is "direct", or "16u2" with
+    the delays and limits of the board's USB bridge.
     """
 
-    def __init__(self, image: str | Path, baud: int = BAUD, setup: ArmSetup | None = None) -> None:
+    def __init__(
+        self,
+        image: str | Path,
+        baud: int = BAUD,
+        setup: ArmSetup | None = None,
+        usb: Literal["direct", "16u2"] = "direct",
+    ) -> None:
         from planarm_sim import SimError, Uno  # noqa: PLC0415 - brings Numba, which only emulation needs
 
         try:
-            self.uno = Uno.from_hex(image, baud=baud)
+            self.uno = Uno.from_hex(image, baud=baud, usb=usb)
         except (SimError, OSError) as error:
             raise LinkError(f"port sim://: {error}") from error
         self._machine: Uno | Bench = self.uno

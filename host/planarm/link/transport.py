@@ -3,6 +3,7 @@
 ==============================  =====================================================================
 ``sim://``                      the emulated Uno in this process, in virtual time, with the released image
 ``sim://?image=PATH``           the same with another flash image (Intel HEX)
+``sim://?usb=16u2``             the same with the delays and limits of the board's USB bridge
 ``/dev/ttyACM0``, ``COM3``      a serial port or a pty
 ``socket://host:port`` and      whatever pyserial opens by URL
 ``rfc2217://``, ``loop://`` ..
@@ -10,7 +11,7 @@
 """
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any, Literal, Protocol
 from urllib.parse import parse_qs, urlsplit
 
 from planarm.errors import LinkError
@@ -100,7 +101,9 @@ def _open_emulator(url: str, baud: int, setup: ArmSetup | None) -> Transport:
 
     parts = urlsplit(url)
     options = parse_qs(parts.query, keep_blank_values=True)
-    if parts.netloc or parts.path or set(options) - {"image"}:
-        raise LinkError(f"port {url!r}: the emulator takes sim:// or sim://?image=PATH")
+    kinds: dict[str, Literal["direct", "16u2"]] = {"direct": "direct", "16u2": "16u2"}
+    usb = kinds.get(options.get("usb", ["direct"])[-1])
+    if parts.netloc or parts.path or set(options) - {"image", "usb"} or usb is None:
+        raise LinkError(f"port {url!r}: the emulator takes sim://, sim://?image=PATH, sim://?usb=16u2, or both by &")
     images = options.get("image")
-    return SimTransport(images[-1] if images else released_image(), baud, setup)
+    return SimTransport(images[-1] if images else released_image(), baud, setup, usb)
