@@ -45,12 +45,13 @@ class Artefacts:
         self.writers[name] = write
 
     def keep(self, folder: Path) -> list[str]:
-        """Write all of them; returns their names."""
+        """Write all of them; returns the names of those that had something to write."""
         if self.writers:
             folder.mkdir(parents=True, exist_ok=True)
         for name, write in self.writers.items():
+            (folder / name).unlink(missing_ok=True)  # an older run's
             write(folder / name)
-        return list(self.writers)
+        return [name for name in self.writers if (folder / name).exists()]
 
 
 _ARTEFACTS = pytest.StashKey[Artefacts]()
@@ -120,10 +121,16 @@ def _found(firmware: str | Path, request: pytest.FixtureRequest) -> Path:
 
 
 def _keep_what_it_does(board: Uno, artefacts: Artefacts, suffix: str) -> None:
-    from planarm_sim.recording import TRACED_PINS  # noqa: PLC0415 - see the module's text
+    from planarm_sim.recording import TRACED_PINS, write_profile  # noqa: PLC0415 - see the module's text
     from planarm_sim.trace import write_serial_log  # noqa: PLC0415
 
     artefacts.add(f"pins{suffix}.vcd", lambda path: board.write_vcd(path, TRACED_PINS))
+
+    def profile(path: Path) -> None:
+        if board.is_observed:
+            write_profile(path, board.insight())
+
+    artefacts.add(f"profile{suffix}.json", profile)
     artefacts.add(f"serial{suffix}.csv", lambda path: write_serial_log(path, board.serial.log))
 
 

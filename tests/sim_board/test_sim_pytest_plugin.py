@@ -1,5 +1,6 @@
 """The pytest plugin, on test runs made for the purpose, in processes of their own."""
 
+import json
 import subprocess
 import sys
 from pathlib import Path
@@ -52,7 +53,9 @@ def test_marked_tests_get_their_boards_and_failed_ones_tell_where_they_left_what
             uno.run(seconds=0.001)
             uno.serial.write(b"A")
             uno.run(seconds=0.01)
-            make_uno({str(PULSES)!r}).run(cycles=4000)
+            second = make_uno({str(PULSES)!r})
+            second.observe()
+            second.run(cycles=4000)
             assert uno.serial.read() == b"R\\x01A"
 
         def test_runs_nothing(uno):
@@ -63,7 +66,9 @@ def test_marked_tests_get_their_boards_and_failed_ones_tell_where_they_left_what
     result.stdout.fnmatch_lines(["*test_runs_nothing asks for an Uno, and nothing says what it runs: mark the test*"])
     (folder,) = (pytester.path / "uno-artefacts").iterdir()
     assert folder.name == "test_board.py_test_fails_a_b"
-    result.stdout.fnmatch_lines(["*emulated Uno*", f"*pins.vcd, serial.csv, pins-2.vcd, serial-2.csv*kept in {folder}"])
+    result.stdout.fnmatch_lines(
+        ["*emulated Uno*", f"*pins.vcd, serial.csv, pins-2.vcd, profile-2.json, serial-2.csv*kept in {folder}"]
+    )
     log = (folder / "serial.csv").read_text().splitlines()
     assert log[0] == "start_cycle,end_cycle,start_us,direction,byte,character"
     assert [line.split(",")[3:] for line in log[1:]] == [
@@ -73,6 +78,7 @@ def test_marked_tests_get_their_boards_and_failed_ones_tell_where_they_left_what
         ["from board", "0x42", "B"],
     ]
     assert int(log[3].split(",")[1]) == int(log[3].split(",")[0]) + 640, "ten bits at 250,000 baud"
+    assert json.loads((folder / "profile-2.json").read_text())["cycles"] >= 4000
     assert (folder / "pins-2.vcd").read_text().startswith("$comment")
 
 

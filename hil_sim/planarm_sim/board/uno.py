@@ -353,6 +353,11 @@ class Uno:
         self._observer.begin(self.cycle)
         self._chip.watch(self._observer)
 
+    @property
+    def is_observed(self) -> bool:
+        """Whether the program is watched."""
+        return self._observer is not None
+
     def insight(self) -> Insight:
         """What the program did since `observe`, or since the last `restore` after it.
 

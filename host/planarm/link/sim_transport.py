@@ -42,8 +42,8 @@ class EmulatorClock:
 class SimTransport:
     """A line to an Uno emulated from a flash image; `pins` shows its edges, `uno` is the board itself.
 
-    With a setup drivers, motors and an arm stand around it, and `arm` shows what they do. `usb` is "direct", or "16u2" with
-    the delays and limits of the board's USB bridge.
+    With a setup drivers, motors and an arm stand around it, and `arm` shows what they do. `usb` is "direct", or "16u2"
+    with the delays and limits of the board's USB bridge.
     """
 
     def __init__(
