@@ -17,7 +17,17 @@ CORE, VARIANT, LIBRARIES = HARDWARE / "cores/arduino", HARDWARE / "variants/stan
 USER_LIBRARIES = (Path.home() / "Arduino/libraries", Path("/usr/share/arduino/libraries"))
 CORE_SOURCES = (
     *("hooks.c", "wiring.c", "wiring_analog.c", "wiring_digital.c", "WInterrupts.c", "HardwareSerial.cpp"),
-    *("HardwareSerial0.cpp", "main.cpp", "Print.cpp", "Stream.cpp", "Tone.cpp", "WString.cpp", "new.cpp", "abi.cpp"),
+    *(
+        "HardwareSerial0.cpp",
+        "main.cpp",
+        "Print.cpp",
+        "Stream.cpp",
+        "Tone.cpp",
+        "WMath.cpp",
+        "WString.cpp",
+        "new.cpp",
+        "abi.cpp",
+    ),
 )
 FLAGS = (
     *("-c", "-g", "-Os", "-w", "-ffunction-sections", "-fdata-sections", "-mmcu=atmega328p", "-DF_CPU=16000000L"),

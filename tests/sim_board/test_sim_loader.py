@@ -240,6 +240,42 @@ def test_first_bytes_tell_the_kind_of_file(tmp_path: Path):
 # --- what avr-gcc makes ---
 
 
+@pytest.fixture(scope="module")
+def compiled(tmp_path_factory) -> bytes:
+    if shutil.which("avr-gcc") is None:
+        pytest.skip("avr-gcc is not installed (Debian: gcc-avr, avr-libc)")
+    elf = tmp_path_factory.mktemp("elf") / "a.elf"
+    source = "static int f(int n) { return n; } int g(void) { return f(2); } int main(void) { return g(); }"
+    command = ["avr-gcc", "-mmcu=atmega328p", "-O0", "-g", "-x", "c", "-", "-o", elf]
+    subprocess.run(command, input=source.encode(), check=True, timeout=60)
+    return elf.read_bytes()
+
+
+def test_functions_come_with_their_names(compiled):
+    symbols = parse_elf(compiled, "a.elf").symbols
+    named = {symbol.name: symbol for symbol in symbols}
+    assert {"main", "f", "g", "__vectors"} <= set(named)
+    assert not any(name.startswith(("__ctors", "__dtors", "__trampolines", "_etext")) for name in named)
+    assert [s.address for s in symbols] == sorted({s.address for s in symbols})
+    assert named["f"].address + named["f"].size == named["g"].address
+
+
+@settings(deadline=None, max_examples=300)
+@given(st.data())
+def test_a_damaged_elf_file_is_read_or_refused_by_name(compiled, data):
+    damaged = bytearray(compiled)
+    tables = st.integers(len(compiled) - 40 * 25, len(compiled) - 1)  # section headers stand at the end
+    anywhere = st.integers(0, 200) | st.integers(0, len(compiled) - 1) | tables
+    for place in data.draw(st.lists(anywhere, min_size=1, max_size=5)):
+        damaged[place] = data.draw(st.sampled_from([0, 1, 0x7F, 0xFF]) | st.integers(0, 255))
+    try:
+        image = parse_elf(bytes(damaged), "a.elf")
+    except ImageError as error:
+        assert "a.elf" in str(error)
+    else:
+        assert len(image.flash) == FLASH_BYTES
+
+
 @pytest.mark.skipif(
     shutil.which("avr-gcc") is None, reason="avr-gcc is not installed: the test programs are not rebuilt"
 )

@@ -52,7 +52,17 @@ def test_pin_table_is_the_boards():
 
 @pytest.mark.parametrize(
     ("wrong", "closest"),
-    [("D14", "D13"), ("d9", "D9"), ("A6", "A5"), ("9", "D9"), ("PB1", "D9"), ("pc5", "A5"), ("D1O", "D1"), ("", "")],
+    [
+        ("D14", "D13"),
+        ("d9", "D9"),
+        ("A6", "A5"),
+        ("9", "D9"),
+        (9, "D9"),
+        ("PB1", "D9"),
+        ("pc5", "A5"),
+        ("D1O", "D1"),
+        ("", ""),
+    ],
 )
 def test_an_unknown_pin_names_the_closest(pulses, wrong, closest):
     for ask in (pulses.edges, pulses.pin, pin_place):
@@ -118,7 +128,17 @@ def test_seconds_are_cycles(pulses):
     assert pulses.time_s == pulses.cycle / CLOCK_HZ
 
 
-@pytest.mark.parametrize("arguments", [{}, {"cycles": 1, "seconds": 1.0}, {"cycles": -1}, {"seconds": -0.1}])
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        {},
+        {"cycles": 1, "seconds": 1.0},
+        {"cycles": -1},
+        {"seconds": -0.1},
+        {"seconds": float("nan")},
+        {"seconds": float("inf")},
+    ],
+)
 def test_time_is_given_once_and_forward(pulses, arguments):
     with pytest.raises(UsageError):
         pulses.run(**arguments)
@@ -161,6 +181,13 @@ def test_bytes_take_ten_bits_each_way(echo):
     # program polls: at most some 20 cycles.
     assert start + 2 * BYTE_CYCLES - 64 < arrivals[0] < start + 2 * BYTE_CYCLES + 64 + 20
     assert np.diff(arrivals) == pytest.approx([BYTE_CYCLES] * 2, abs=64 + 20)
+
+
+@pytest.mark.parametrize("data", ["text", [1, 2], 5, None])
+def test_a_line_takes_bytes_only(echo, data):
+    with pytest.raises(UsageError, match="a serial line takes bytes, not"):
+        echo.serial.write(data)
+    assert echo.serial.pending == 0
 
 
 def test_pending_counts_what_is_still_on_the_line(echo):

@@ -71,7 +71,7 @@ def pin_place(name: str) -> PinPlace:
     """
     if name in _BY_NAME:
         return _BY_NAME[name]
-    raise PinError(f"an Uno has no pin {name!r}; it has D0 to D13 and A0 to A5. Closest: {_closest(name)}")
+    raise PinError(f"an Uno has no pin {name!r}; it has D0 to D13 and A0 to A5. Closest: {_closest(str(name))}")
 
 
 def _closest(name: str) -> str:

@@ -129,7 +129,15 @@ class SerialPort:
         return self._framing_errors
 
     def write(self, data: bytes) -> None:
-        """Send bytes to the board; the first starts now, or after those still on their way."""
+        """Send bytes to the board; the first starts now, or after those still on their way.
+
+        Raises:
+            UsageError: something else than bytes.
+        """
+        if not isinstance(data, bytes | bytearray | memoryview):
+            raise UsageError(
+                f"a serial line takes bytes, not {type(data).__name__}: encode text, wrap numbers by bytes()"
+            )
         if self._line_free_cycle() < self._chip.cycle:
             self._burst_start, self._burst_bytes = self._chip.cycle, 0
         bit_cycles = self._bit_cycles[0] / self._bit_cycles[1]

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from planarm_sim.board.pins import PINS, PinPlace, pin_place
 from planarm_sim.board.serial import CLOCK_HZ, FRAME_BITS, SerialPort, SerialState, Usb
 from planarm_sim.cpu.chip import EDGE_DTYPE, Chip, ResetCause, Snapshot, StopCause
+from planarm_sim.cpu.layout import NEVER
 from planarm_sim.debug import GdbServer, Target, serve
 from planarm_sim.errors import LimitError, PinError, StoppedError, UsageError
 from planarm_sim.insight import Insight, Observer
@@ -227,9 +228,10 @@ class Uno:
         """
         if (cycles is None) == (seconds is None):
             raise UsageError("run takes either cycles or seconds")
-        length = round(seconds * CLOCK_HZ) if seconds is not None else int(cycles or 0)
-        if length < 0:
-            raise UsageError(f"run was asked for {length} cycles; time runs forward only")
+        asked = seconds * CLOCK_HZ if seconds is not None else cycles or 0
+        if not 0 <= asked < NEVER:
+            raise UsageError(f"run was asked for {asked} cycles; time runs forward only, and comes to an end")
+        length = round(asked)
         self._run_to(self._chip.cycle + length)
 
     def run_until(
