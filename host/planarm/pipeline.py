@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from planarm.analysis.step_count import Waveform, compare_steps, measure_steps
 from planarm.arm_findings import SETTLE_S, ArmFindings, judge_arm, start_tick_of
-from planarm.errors import CertificateError, NoPathError, SceneError, StepsDifferError, TimingError
+from planarm.errors import CertificateError, StepsDifferError, TimingError
 from planarm.fastest.task import fastest_path
 from planarm.link.arm_record import ArmSetup, ArmTrace
 from planarm.link.exchange import StreamResult, stream_plan
@@ -27,14 +27,10 @@ from planarm.model.kinematics import forward
 from planarm.model.transmission import motor_axes
 from planarm.plan import Findings, Plan
 from planarm.plan_file import StoredPlan
+from planarm.route import find_route
 from planarm.run_folder import begin_run_folder, finish_run_folder
 from planarm.scene import Scene
-from planarm.search.diagnosis import diagnose
-from planarm.search.grid_search import find_path
 from planarm.search.path import Path as TipPath
-from planarm.search.result import SearchStatus
-from planarm.smoothing.smooth import smooth_path
-from planarm.smoothing.smooth_path import SmoothPath
 from planarm.stepping.certify import Certificate, certify
 from planarm.stepping.quantise import quantisation_bound_cm, quantise
 from planarm.stepping.segments import Coding, SegmentPlan, compress, expand
@@ -43,10 +39,6 @@ from planarm.trajectory.binding import report_timing
 from planarm.trajectory.limits import Limits
 from planarm.trajectory.motion import Trajectory
 from planarm.trajectory.timing import fastest_motion
-from planarm.workspace.check_task import check_task
-from planarm.workspace.free_map import FreeMap, build_free_map
-from planarm.workspace.joint_proof import joint_world
-from planarm.workspace.world import elbow_sides
 from planarm_wire.messages import DIR_PINS, STEP_PINS
 
 Notice = Callable[[str, float], None]
@@ -69,12 +61,14 @@ def plan_scene(scene: Scene, notice: Notice) -> Plan:
     """
     began_s = time.perf_counter()
     notice("plan", 0.0)
-    free_map, path, search_s = shortest_path(scene)
+    # Half a micro-step in every joint is kept as well (docs/decisions/0005).
+    margin_cm = scene.margin_cm + quantisation_bound_cm(Arm.from_spec(scene.arm), scene.joints, scene.coupling)
+    route = find_route(scene, margin_cm)
     notice("plan", 0.4)
     limits = Limits.of(scene)
-    trajectory = fastest_motion(smoothed(scene, free_map, path), limits)
+    trajectory, path = fastest_motion(route.smooth, limits), route.path
     if scene.planner.objective == "time":
-        trajectory = optimised(scene, free_map.margin_cm, trajectory, limits, notice)
+        trajectory = optimised(scene, margin_cm, trajectory, limits, notice)
         path = TipPath.through(tip_curve_cm(trajectory, Arm.from_spec(scene.arm)), path.elbow)
     if trajectory.duration_s > LONGEST_MOTION_S:
         raise TimingError(
@@ -89,7 +83,7 @@ def plan_scene(scene: Scene, notice: Notice) -> Plan:
     notice("plan", 1.0)
     return Plan(
         scene,
-        free_map,
+        route.free_map,
         path,
         trajectory.path,
         trajectory,
@@ -98,44 +92,8 @@ def plan_scene(scene: Scene, notice: Notice) -> Plan:
         certificate,
         plan_ms=1e3 * (time.perf_counter() - began_s),
         timing=report_timing(trajectory, limits),
-        search_ms=1e3 * search_s,
-    )
-
-
-def shortest_path(scene: Scene) -> tuple[FreeMap, TipPath, float]:
-    """Search on each elbow side that the scene allows; return the shortest path, its map and the search's seconds.
-
-    The margin holds half a micro-step in every joint (docs/decisions/0005).
-
-    Raises:
-        SceneError, NoPathError: no side has a path; the first side's reason.
-    """
-    margin_cm = scene.margin_cm + quantisation_bound_cm(Arm.from_spec(scene.arm), scene.joints, scene.coupling)
-    found: list[tuple[FreeMap, TipPath, float]] = []
-    for side in elbow_sides(scene.arm):
-        try:
-            free_map = build_free_map(scene, margin_cm, side)
-            check_task(scene, free_map)
-        except SceneError:  # on this side; told below when it is so on all sides
-            continue
-        result = find_path(free_map, scene.task.start_cm, scene.task.goal_cm, scene.planner)
-        if result.path is not None:
-            found.append((free_map, result.path, result.plan_s))
-    if not found:
-        raise no_path(scene, margin_cm)
-    return min(found, key=lambda one: one[1].length_cm)
-
-
-def smoothed(scene: Scene, free_map: FreeMap, path: TipPath) -> SmoothPath:
-    """Round the path's corners, or stop at them, as the scene says.
-
-    Raises:
-        TimingError: The path meets full stretch or fold, and no motion near it can be proved free.
-    """
-    world = joint_world(scene, free_map.margin_cm)
-    motion = scene.motion
-    return smooth_path(
-        path, free_map, Arm.from_spec(scene.arm), world, motion.tolerance_cm, stop=motion.corners == "stop"
+        search_ms=1e3 * route.search_s,
+        joint=route.joint,
     )
 
 
@@ -154,19 +112,6 @@ def tip_curve_cm(trajectory: Trajectory, arm: Arm) -> NDArray[np.float64]:
     """Return positions of the tip along a motion, shape (m, 2), for reports."""
     s = np.linspace(trajectory.s[0], trajectory.s[-1], CURVE_POINTS)
     return np.asarray(forward(arm, trajectory.path.evaluate(s).q_rad)[:, -1])
-
-
-def no_path(scene: Scene, margin_cm: float) -> SceneError | NoPathError:
-    """Return the error that tells why a scene has no path and what would help."""
-    found = diagnose(scene, margin_cm)
-    ends = {SearchStatus.START_BLOCKED: "task.start_cm", SearchStatus.GOAL_BLOCKED: "task.goal_cm"}
-    error: SceneError | NoPathError
-    if found.status in ends and found.cause != "join":
-        error = SceneError(scene.source, ends[found.status], found.reason)
-    else:
-        error = NoPathError(f"{scene.source}: {found.reason}")
-    error.advice, error.fields = found.advice, found.fields()
-    return error
 
 
 def stored(plan: Plan) -> StoredPlan:

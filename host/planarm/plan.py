@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from planarm.analysis.step_count import MeasuredSteps, StepComparison
 from planarm.scene import Scene
+from planarm.search.joint_space import JointRoute
 from planarm.search.path import Path
 from planarm.smoothing.smooth_path import SmoothPath
 from planarm.stepping.certificate import Certificate
@@ -34,6 +35,8 @@ class Plan:
     """Which limits hold the motion back, and what the braking share costs."""
     search_ms: float
     """Wall time of the grid search alone."""
+    joint: JointRoute | None = None
+    """The way-points of a route in joint space."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -73,10 +73,10 @@ def _draw(plan: Plan, workspace: Path, joint_angles: Path, step_rates: Path) -> 
         y_cm=plan.free_map.y_cm,
         region=plan.free_map.region,
         obstacles=[shape_of(obstacle) for obstacle in scene.obstacles],
-        path_points_cm=plan.path.points_cm,
+        path_points_cm=plan.path.points_cm if plan.joint is None else forward(arm, plan.joint.poses_rad)[:, -1],
         poses_cm=forward(arm, q_rad[shown]),
         title=scene.name,
-        subtitle=f"{scene.planner.algorithm} ({scene.planner.neighbours}), {plan.path.length_cm:.4f} cm",
+        subtitle=f"{_search_words(plan)}, {plan.path.length_cm:.4f} cm",
         tip_curve_cm=forward(arm, q_rad)[:, -1],
     )
     draw_joint_angles(joint_angles, t_s, q_rad, limits_rad=scene.arm.joint_limits_rad, title=scene.name)
@@ -88,3 +88,12 @@ def _draw(plan: Plan, workspace: Path, joint_angles: Path, step_rates: Path) -> 
         limit_hz=TICKS_HZ / MIN_INTERVAL_TICKS,
         title=scene.name,
     )
+
+
+def _search_words(plan: Plan) -> str:
+    """Say how the path was found."""
+    planner, joint = plan.scene.planner, plan.joint
+    if joint is None:
+        return f"{planner.algorithm} ({planner.neighbours})"
+    changes = len(joint.changes_cm)
+    return f"joint space, least {joint.objective.replace('_', ' ')}, {changes} change{'s' * (changes != 1)} of elbow"

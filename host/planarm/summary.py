@@ -38,6 +38,8 @@ def summarise(
         "neighbours": scene.planner.neighbours,
         "seed": scene.planner.seed,
         "moves": scene.planner.moves,
+        "space": "tip" if plan.joint is None else "joint",
+        "elbow_changes": 0 if plan.joint is None else len(plan.joint.changes_cm),
         "path_length_cm": round(plan.path.length_cm, 6),
         "search_ms": round(plan.search_ms, 3),
         "plan_ms": round(plan.plan_ms, 3),

@@ -75,6 +75,14 @@ ALLOWED: dict[str, set[str]] = {
         "planarm.stepping",
         "planarm.analysis",
     },
+    "planarm.route": {
+        "planarm.errors",
+        "planarm.scene",
+        "planarm.model",
+        "planarm.workspace",
+        "planarm.search",
+        "planarm.smoothing",
+    },
     "planarm.pipeline": {
         "planarm",
         "planarm.arm_findings",
@@ -91,6 +99,7 @@ ALLOWED: dict[str, set[str]] = {
         "planarm.analysis",
         "planarm.plan",
         "planarm.plan_file",
+        "planarm.route",
         "planarm.run_folder",
         "planarm.summary",
         "planarm_wire",

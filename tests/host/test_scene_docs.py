@@ -22,6 +22,7 @@ TABLES = {
     "mechanics": load.MECHANICS_KEYS,
     "transmission": load.TRANSMISSION_KEYS,
     "motion": load.MOTION_KEYS,
+    "joint_space": load.JOINT_SPACE_KEYS,
 }
 
 

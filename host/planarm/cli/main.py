@@ -203,6 +203,7 @@ def _add_scene(command: argparse.ArgumentParser) -> None:
     command.add_argument("--planner", choices=PLANNERS, help="overrides the scene's algorithm")
     command.add_argument("--neighbours", type=int, metavar="N", help="overrides the scene's neighbourhood")
     command.add_argument("--seed", type=int, metavar="N", help="overrides the scene's seed (Chaos A*)")
+    command.add_argument("--space", choices=("tip", "joint"), help="plan the tip's way, or the joints' (both elbows)")
 
 
 def _add_port(command: argparse.ArgumentParser) -> None:

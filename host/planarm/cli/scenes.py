@@ -6,7 +6,7 @@ import argparse
 import sys
 from pathlib import Path
 
-from planarm.scene import Scene, load_scene, with_planner
+from planarm.scene import Scene, load_scene, with_planner, with_space
 from planarm_wire.kernel_cache import is_cold
 
 
@@ -16,7 +16,7 @@ def chosen_scene(options: argparse.Namespace) -> Scene:
     Raises:
         SceneError: The scene, or an override, is wrong.
     """
-    scene = load_scene(Path(options.scene))
+    scene = with_space(load_scene(Path(options.scene)), options.space)
     return with_planner(scene, algorithm=options.planner, neighbours=options.neighbours, seed=options.seed)
 
 

@@ -4,7 +4,8 @@ This is the only place where units are converted: the file speaks centimetres an
 centimetres and radians. docs/scene.md is the reference of the format.
 """
 
-from planarm.scene.load import load_scene, parse_scene, with_planner
+from planarm.scene.joint_space import ElbowChoice, JointObjective, JointSpaceSpec
+from planarm.scene.load import load_scene, parse_scene, with_planner, with_space
 from planarm.scene.mechanics import Matrix, MechanicsSpec
 from planarm.scene.motor import MotorSpec
 from planarm.scene.types import (
@@ -33,6 +34,9 @@ __all__ = [
     "ArmSpec",
     "Corners",
     "Elbow",
+    "ElbowChoice",
+    "JointObjective",
+    "JointSpaceSpec",
     "JointSpec",
     "LinkSpec",
     "Matrix",
@@ -53,4 +57,5 @@ __all__ = [
     "load_scene",
     "parse_scene",
     "with_planner",
+    "with_space",
 ]

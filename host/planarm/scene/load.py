@@ -6,6 +6,7 @@ from math import radians
 from pathlib import Path
 
 from planarm.errors import SceneError
+from planarm.scene.joint_space import JOINT_SPACE_KEYS, JointSpaceSpec, read_joint_space
 from planarm.scene.mechanics import MECHANICS_KEYS, TRANSMISSION_KEYS, parse_coupling, parse_mechanics
 from planarm.scene.motion import MOTION_KEYS, read_motion
 from planarm.scene.motor import KEYS as MOTOR_KEYS
@@ -42,6 +43,7 @@ ROOT_KEYS = (
     "mechanics",
     "transmission",
     "motion",
+    "joint_space",
 )
 ARM_KEYS = ("link_lengths_cm", "link_width_cm", "base_cm", "elbow", "joint_limits_deg", "floor")
 WORKSPACE_KEYS = ("x_cm", "y_cm", "cell_cm", "clearance_cm")
@@ -127,6 +129,9 @@ def parse_scene(text: str, source: str) -> Scene:
         link=_link(root.table("link", LINK_KEYS, optional=True)),
         mechanics=parse_mechanics(root.table("mechanics", MECHANICS_KEYS, optional=True), arm.link_lengths_cm),
         coupling=parse_coupling(root.table("transmission", TRANSMISSION_KEYS, optional=True), LINKS),
+        joint_space=read_joint_space(root.table("joint_space", JOINT_SPACE_KEYS), arm.elbow)
+        if "joint_space" in data
+        else None,
         motion=read_motion(root.table("motion", MOTION_KEYS, optional=True)),
     )
 
@@ -155,6 +160,15 @@ def with_planner(
     elif changed["algorithm"] == before.algorithm:
         changed["neighbours"] = before.neighbours
     return replace(scene, planner=_planner(Table(scene.source, "planner", changed)))
+
+
+def with_space(scene: Scene, space: str | None) -> Scene:
+    """Return the scene planned in another space, "tip" or "joint"; None keeps what the scene says."""
+    if space == "tip":
+        return replace(scene, joint_space=None)
+    if space == "joint" and scene.joint_space is None:
+        return replace(scene, joint_space=JointSpaceSpec(start_elbow=scene.arm.elbow))
+    return scene
 
 
 def _arm(table: Table) -> ArmSpec:

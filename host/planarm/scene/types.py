@@ -4,6 +4,7 @@ from dataclasses import dataclass, field
 from math import ceil, floor, pi
 from typing import Literal
 
+from planarm.scene.joint_space import JointSpaceSpec
 from planarm.scene.mechanics import Matrix, MechanicsSpec
 from planarm.scene.motor import MotorSpec
 
@@ -156,6 +157,8 @@ class Scene:
     coupling: Matrix
     """Row m says how far motor m turns, behind its gear, when each joint turns once."""
     motion: MotionSpec = MotionSpec()
+    joint_space: JointSpaceSpec | None = None
+    """How to plan in joint space; None plans in tip space."""
 
     @property
     def margin_cm(self) -> float:

@@ -10,8 +10,9 @@ import numpy as np
 from planarm.errors import SceneError
 from planarm.model.arm import Arm
 from planarm.model.kinematics import ElbowSide, inverse_2r
-from planarm.scene import Point, Scene
+from planarm.scene import ElbowChoice, JointSpaceSpec, Point, Scene
 from planarm.search.grid_search import find_path
+from planarm.search.joint_space import SIDES, JointSearchResult, find_joint_route
 from planarm.search.passage import closing_obstacles, passes, widest_margin_cm
 from planarm.search.result import SearchStatus
 from planarm.workspace.check_task import pose_problem
@@ -30,7 +31,7 @@ from planarm.workspace.world import (
 Cause = Literal["beyond_reach", "inner_hole", "obstacle", "limit", "join", "passage", "elbow", "draw"]
 End = Literal["start", "goal"]
 
-SIDES: Final[tuple[ElbowSide, ...]] = ("up", "down")
+JOINT_SPACE: Final = "a table [joint_space] in the scene, or --space joint"
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,6 +95,37 @@ def diagnose(scene: Scene, margin_cm: float) -> Diagnosis:
     return _diagnose_way(scene, maps[common[0]])
 
 
+def diagnose_joints(scene: Scene, margin_cm: float, result: JointSearchResult) -> Diagnosis:
+    """Say why a scene has no way in joint space.
+
+    Args:
+        scene: the scene.
+        margin_cm: least distance of a link's centre line to an obstacle.
+        result: what the search answered.
+    """
+    spec = scene.joint_space or JointSpaceSpec()
+    sides: dict[ElbowChoice, ElbowSide] = {"up": "up", "down": "down", "either": "up"}
+    if result.status in (SearchStatus.START_BLOCKED, SearchStatus.GOAL_BLOCKED):
+        name: End = "start" if result.status is SearchStatus.START_BLOCKED else "goal"
+        point = scene.task.start_cm if name == "start" else scene.task.goal_cm
+        side = sides[spec.start_elbow if name == "start" else spec.goal_elbow]
+        found = _diagnose_end(scene, build_free_map(scene, margin_cm, side), name, point, [])
+        return replace(found, reason=f"[{point[0]:g}, {point[1]:g}]: {result.reason}")
+    opening = tuple(
+        (k + 1,)
+        for k in range(len(scene.obstacles))
+        if find_joint_route(_without(scene, k), margin_cm, spec).route is not None
+    )
+    advice = [f"taking away {' or '.join(_list(one) for one in opening)} opens the way"] if opening else []
+    advice.append(f"joint_space.cell_deg below {np.degrees(spec.cell_rad):g}")
+    side = sides[spec.start_elbow]
+    return Diagnosis(result.status, "passage", result.reason, tuple(advice), side, opening=opening, margin_cm=margin_cm)
+
+
+def _without(scene: Scene, k: int) -> Scene:
+    return replace(scene, obstacles=scene.obstacles[:k] + scene.obstacles[k + 1 :])
+
+
 def _maps(scene: Scene, margin_cm: float) -> Iterator[tuple[ElbowSide, FreeMap]]:
     """Yield the map of each allowed side that the limits of joint 2 leave."""
     problem: SceneError | None = None
@@ -127,6 +159,8 @@ def _diagnose_end(
             f"the nearest free cell is ({nearest[0]:g}, {nearest[1]:g}) cm, {away_cm:.2f} cm away: task.{name}_cm"
         )
     advice += [f'the pose is free on the other elbow side: arm.elbow = "{side}"' for side in other_sides]
+    if other_sides and name == "goal":
+        advice.append(f"in joint space the elbow may change its side on the way: {JOINT_SPACE}")
     if blocking:
         least = min(near[k] for k in blocking)
         advice.append(
@@ -193,8 +227,8 @@ def _advice_on_way(
             yield f'with arm.elbow = "{other}" there is a path'
     if room_cm is None and not opening:
         yield f"workspace.cell_cm below {scene.workspace.cell_cm:g}, or a larger workspace"
-    if side in SIDES:
-        yield 'planner.space = "joint": the arm may then change its elbow side on the way'
+    if find_joint_route(scene, margin_cm).route is not None:
+        yield f"in joint space there is a way, with changes of the elbow's side: {JOINT_SPACE}"
 
 
 def _elbow_would_have_to_change(scene: Scene, margin_cm: float, start: ElbowSide, goal: ElbowSide) -> Diagnosis:
@@ -202,7 +236,7 @@ def _elbow_would_have_to_change(scene: Scene, margin_cm: float, start: ElbowSide
         f'the start can be held with the elbow "{start}" only, the goal with the elbow "{goal}" only, and the elbow '
         "cannot change its side in tip space"
     )
-    advice = ('planner.space = "joint": the elbow changes through the straight pose',)
+    advice = (f"{JOINT_SPACE}: there the elbow changes its side through the straight pose",)
     return Diagnosis(SearchStatus.ELBOW, "elbow", reason, advice, start, margin_cm=margin_cm)
 
 

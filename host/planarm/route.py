@@ -1,0 +1,126 @@
+"""From a scene to a smooth path, in tip space or in joint space; or the error that tells why there is none."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from planarm.errors import NoPathError, SceneError
+from planarm.model.arm import Arm
+from planarm.scene import JointSpaceSpec, Scene
+from planarm.search.diagnosis import Diagnosis, diagnose, diagnose_joints
+from planarm.search.grid_search import find_path
+from planarm.search.joint_space import SIDES, JointRoute, find_joint_route, tip_points_cm
+from planarm.search.path import Path
+from planarm.search.result import SearchStatus
+from planarm.smoothing.joint_blend import blend_poses
+from planarm.smoothing.smooth import smooth_path
+from planarm.smoothing.smooth_path import SmoothPath
+from planarm.workspace.check_task import check_task
+from planarm.workspace.free_map import FreeMap, build_free_map
+from planarm.workspace.joint_proof import joint_world
+from planarm.workspace.world import FREE, elbow_sides
+
+
+@dataclass(frozen=True, slots=True)
+class Route:
+    """A path and the smooth path made of it."""
+
+    free_map: FreeMap
+    """Of the path's elbow side; of a route in joint space, of both sides together."""
+    path: Path
+    """In tip space the way-points; of a route in joint space the tip's curve, densely."""
+    smooth: SmoothPath
+    search_s: float
+    joint: JointRoute | None = None
+    """The way-points of a route in joint space."""
+
+
+def find_route(scene: Scene, margin_cm: float) -> Route:
+    """Search as the scene says, and smooth.
+
+    Args:
+        scene: what to do; with a table [joint_space] in joint space, else in tip space on each allowed elbow side.
+        margin_cm: least distance of a link's centre line to an obstacle.
+
+    Raises:
+        SceneError, NoPathError: there is no path; the message, `advice` and `fields` say why and what would help.
+        TimingError: the path meets full stretch or fold, and no motion near it can be proved free.
+    """
+    return joint_route(scene, margin_cm, scene.joint_space) if scene.joint_space else tip_route(scene, margin_cm)
+
+
+def tip_route(scene: Scene, margin_cm: float) -> Route:
+    """Return the route along the shortest path of the tip on any allowed elbow side; errors as `find_route`."""
+    found: list[tuple[FreeMap, Path, float]] = []
+    for side in elbow_sides(scene.arm):
+        try:
+            free_map = build_free_map(scene, margin_cm, side)
+            check_task(scene, free_map)
+        except SceneError:  # on this side; told below when it is so on all sides
+            continue
+        result = find_path(free_map, scene.task.start_cm, scene.task.goal_cm, scene.planner)
+        if result.path is not None:
+            found.append((free_map, result.path, result.plan_s))
+    if not found:
+        raise no_path(scene, diagnose(scene, margin_cm))
+    free_map, path, search_s = min(found, key=lambda one: one[1].length_cm)
+    return Route(free_map, path, smoothed(scene, free_map, path), search_s)
+
+
+def joint_route(scene: Scene, margin_cm: float, spec: JointSpaceSpec) -> Route:
+    """Return the route along the cheapest way in joint space; errors as `find_route`."""
+    result = find_joint_route(scene, margin_cm, spec)
+    if result.route is None:
+        raise no_path(scene, diagnose_joints(scene, margin_cm, result))
+    poses_rad = result.route.poses_rad
+    tolerance_cm = None if scene.motion.corners == "stop" else scene.motion.tolerance_cm
+    world = joint_world(scene, margin_cm)
+    smooth = blend_poses(poses_rad, Arm.from_spec(scene.arm), world, tolerance_cm, proved=True)
+    path = Path.through(tip_points_cm(scene, poses_rad), result.route.sides[0])
+    return Route(both_sides(scene, margin_cm), path, smooth, result.plan_s, result.route)
+
+
+def smoothed(scene: Scene, free_map: FreeMap, path: Path) -> SmoothPath:
+    """Round the path's corners, or stop at them, as the scene says.
+
+    Raises:
+        TimingError: the path meets full stretch or fold, and no motion near it can be proved free.
+    """
+    world = joint_world(scene, free_map.margin_cm)
+    motion = scene.motion
+    return smooth_path(
+        path, free_map, Arm.from_spec(scene.arm), world, motion.tolerance_cm, stop=motion.corners == "stop"
+    )
+
+
+def both_sides(scene: Scene, margin_cm: float) -> FreeMap:
+    """Return a map on which a node is free when either elbow side is: to look at, not to search.
+
+    Raises:
+        SceneError: the limits of joint 2 leave no pose at all.
+    """
+    maps: list[FreeMap] = []
+    problem: SceneError | None = None
+    for side in SIDES:
+        try:
+            maps.append(build_free_map(scene, margin_cm, side))
+        except SceneError as error:  # joint 2's limits leave nothing on this side
+            problem = error
+    if problem and not maps:
+        raise problem
+    first, last = maps[0], maps[-1]
+    return replace(first, region=np.where(first.region == FREE, FREE, last.region).astype(np.uint8))
+
+
+def no_path(scene: Scene, found: Diagnosis) -> SceneError | NoPathError:
+    """Return the error that tells why a scene has no path and what would help."""
+    ends = {SearchStatus.START_BLOCKED: "task.start_cm", SearchStatus.GOAL_BLOCKED: "task.goal_cm"}
+    error: SceneError | NoPathError
+    if found.status in ends and found.cause != "join":
+        error = SceneError(scene.source, ends[found.status], found.reason)
+    else:
+        error = NoPathError(f"{scene.source}: {found.reason}")
+    error.advice, error.fields = found.advice, found.fields()
+    return error
