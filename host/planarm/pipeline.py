@@ -61,8 +61,7 @@ def plan_scene(scene: Scene, notice: Notice) -> Plan:
     """
     began_s = time.perf_counter()
     notice("plan", 0.0)
-    # Half a micro-step in every joint is kept as well (docs/decisions/0005).
-    margin_cm = scene.margin_cm + quantisation_bound_cm(Arm.from_spec(scene.arm), scene.joints, scene.coupling)
+    margin_cm = planning_margin_cm(scene)
     route = find_route(scene, margin_cm)
     notice("plan", 0.4)
     limits = Limits.of(scene)
@@ -112,6 +111,11 @@ def tip_curve_cm(trajectory: Trajectory, arm: Arm) -> NDArray[np.float64]:
     """Return positions of the tip along a motion, shape (m, 2), for reports."""
     s = np.linspace(trajectory.s[0], trajectory.s[-1], CURVE_POINTS)
     return np.asarray(forward(arm, trajectory.path.evaluate(s).q_rad)[:, -1])
+
+
+def planning_margin_cm(scene: Scene) -> float:
+    """Return the margin that plans keep: the scene's, and half a micro-step in every joint (docs/decisions/0005)."""
+    return scene.margin_cm + quantisation_bound_cm(Arm.from_spec(scene.arm), scene.joints, scene.coupling)
 
 
 def stored(plan: Plan) -> StoredPlan:

@@ -74,12 +74,17 @@ def joint_route(scene: Scene, margin_cm: float, spec: JointSpaceSpec) -> Route:
     result = find_joint_route(scene, margin_cm, spec)
     if result.route is None:
         raise no_path(scene, diagnose_joints(scene, margin_cm, result))
-    poses_rad = result.route.poses_rad
+    return smoothed_joint_route(scene, margin_cm, result.route, result.plan_s)
+
+
+def smoothed_joint_route(scene: Scene, margin_cm: float, found: JointRoute, search_s: float) -> Route:
+    """Return a way in joint space, which is proved free, with its corners rounded or as stops."""
+    poses_rad = found.poses_rad
     tolerance_cm = None if scene.motion.corners == "stop" else scene.motion.tolerance_cm
     world = joint_world(scene, margin_cm)
     smooth = blend_poses(poses_rad, Arm.from_spec(scene.arm), world, tolerance_cm, proved=True)
-    path = Path.through(tip_points_cm(scene, poses_rad), result.route.sides[0])
-    return Route(both_sides(scene, margin_cm), path, smooth, result.plan_s, result.route)
+    path = Path.through(tip_points_cm(scene, poses_rad), found.sides[0])
+    return Route(both_sides(scene, margin_cm), path, smooth, search_s, found)
 
 
 def smoothed(scene: Scene, free_map: FreeMap, path: Path) -> SmoothPath:

@@ -83,6 +83,15 @@ ALLOWED: dict[str, set[str]] = {
         "planarm.search",
         "planarm.smoothing",
     },
+    "planarm.alternatives": {
+        "planarm.errors",
+        "planarm.scene",
+        "planarm.model",
+        "planarm.workspace",
+        "planarm.search",
+        "planarm.trajectory",
+        "planarm.route",
+    },
     "planarm.pipeline": {
         "planarm",
         "planarm.arm_findings",
@@ -145,6 +154,7 @@ ALLOWED: dict[str, set[str]] = {
     },
     "planarm.cli": {
         "planarm",
+        "planarm.alternatives",
         "planarm.errors",
         "planarm.scene",
         "planarm.link",

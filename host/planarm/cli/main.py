@@ -116,7 +116,10 @@ Commands: TypeAlias = "argparse._SubParsersAction[_Parser]"
 def _add_plan(commands: Commands) -> None:
     command = commands.add_parser("plan", help="plan a scene and write the certified plan", epilog=EXIT_CODES)
     _add_scene(command)
-    command.add_argument("-o", "--output", metavar="FILE.plan", required=True, help="where to write the plan")
+    command.add_argument("-o", "--output", metavar="FILE.plan", help="where to write the plan")
+    command.add_argument(
+        "--alternatives", type=_count, metavar="K", help="tell up to K distinct routes with length, time and clearance"
+    )
     _add_json(command)
 
 

@@ -1,19 +1,37 @@
-"""`planarm plan SCENE -o FILE.plan`."""
+"""`planarm plan SCENE -o FILE.plan`, or `--alternatives K` to see what there is to choose from."""
 
 from __future__ import annotations
 
 import argparse
 import json
+from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
+from planarm.cli.main import UsageError
 from planarm.cli.progress import progress
 from planarm.cli.scenes import chosen_scene, tell_first_compile
+from planarm.cli.terminal import terminal
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+    from planarm.alternatives import Alternative
+    from planarm.scene import Scene
 
 
 def execute(options: argparse.Namespace) -> int:
     """Plan, certify and write; a red certificate is written too, and told by the exit code."""
+    if not options.alternatives and not options.output:
+        raise UsageError("give -o FILE.plan for a plan, or --alternatives K to see the routes")
     scene = chosen_scene(options)
     tell_first_compile("planarm")
+    if options.alternatives:
+        routes = _alternatives(scene, options)
+        if not options.output:
+            if options.json:
+                print(json.dumps({"routes": routes}))
+            return 0
     from planarm.errors import CertificateError
     from planarm.output import require_place
     from planarm.pipeline import plan_scene, stored
@@ -30,16 +48,49 @@ def execute(options: argparse.Namespace) -> int:
     save_plan(stored(plan), target)
     if not plan.certificate.ok:
         raise CertificateError(f"{target}: {plan.certificate.explain()}")
-    told = {
+    told: dict[str, Any] = {
         "plan": str(target),
         "path_length_cm": plan.path.length_cm,
         **plan.timing.figures(),
         "segments": len(plan.segments.segments),
         "plan_ms": plan.plan_ms,
     }
+    if options.alternatives:
+        told["routes"] = routes
     if options.json:
         print(json.dumps(told))
     else:
         print(f"{target}: {plan.path.length_cm:.4f} cm in {plan.trajectory.duration_s:.3f} s")
         print(plan.timing.words())
     return 0
+
+
+def _alternatives(scene: Scene, options: argparse.Namespace) -> list[dict[str, object]]:
+    """Find the routes, print them as a table unless JSON is wanted, and return their figures."""
+    from planarm.alternatives import alternatives
+    from planarm.pipeline import planning_margin_cm
+
+    with progress(options.json) as notice:
+        notice("routes", 0.0)
+        found = alternatives(scene, planning_margin_cm(scene), options.alternatives)
+        notice("routes", 1.0)
+    if not options.json:
+        terminal().print(_table(found, scene.name))
+    return [one.fields() for one in found]
+
+
+def _table(found: Sequence[Alternative], title: str) -> Table:
+    from rich import box
+    from rich.table import Table
+
+    table = Table(title=title, title_justify="left", box=box.SIMPLE_HEAD, pad_edge=False)
+    for name in ("route", "elbow", "length (cm)", "time (s)", "clearance (cm)"):
+        table.add_column(name, justify="left" if name in ("route", "elbow") else "right")
+    table.add_column("past obstacle, elbow", overflow="fold")
+    for number, one in enumerate(found, start=1):
+        elbow = one.elbow[0] if one.elbow[0] == one.elbow[1] else f"{one.elbow[0]} to {one.elbow[1]}"
+        time = "none" if one.motion_s is None else f"{one.motion_s:.3f}"
+        clearance = "none" if one.clearance_cm is None else f"{one.clearance_cm:.3f}"
+        passes = ", ".join(one.passes).replace("obstacles[", "").replace("]", "")
+        table.add_row(str(number), elbow, f"{one.path.length_cm:.3f}", time, clearance, passes)
+    return table

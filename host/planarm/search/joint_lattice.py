@@ -59,6 +59,8 @@ class Costs(NamedTuple):
     """Added when the elbow changes its side, in the objective's unit."""
     reach_cm: Floats
     """How far one radian of each joint can move a point of the arm at most, shape (2,)."""
+    closed: Floats
+    """Half lines that no move may cross, shape (m, 2): theta1, and the sign of theta2."""
 
 
 @kernel
@@ -122,10 +124,27 @@ def tip_of(world: JointWorld, theta1: float, theta2: float) -> tuple[float, floa
 
 
 @kernel
+def crosses(lines: Floats, a1: float, a2: float, b1: float, b2: float) -> bool:
+    """Tell whether a straight move crosses one of some half lines; theta2 = 0 belongs to the positive ones."""
+    for k in range(lines.shape[0]):
+        theta1 = lines[k, 0]
+        if (a1 < theta1) != (b1 < theta1):
+            theta2 = a2 + (theta1 - a1) / (b1 - a1) * (b2 - a2)
+            if (theta2 < 0.0) == (lines[k, 1] < 0.0):
+                return True
+    return False
+
+
+@kernel
 def move_is_free(
     world: JointWorld, costs: Costs, a1: float, a2: float, spare_a: float, b1: float, b2: float, spare_b: float
 ) -> bool:
-    """Tell whether a straight move is proved free: at once where there is room enough at both ends, else by halving."""
+    """Tell whether a straight move crosses nothing closed and is proved free.
+
+    At once where there is room enough at both ends, else by halving.
+    """
+    if crosses(costs.closed, a1, a2, b1, b2):
+        return False
     half = 0.5 * (abs(b1 - a1) * costs.reach_cm[0] + abs(b2 - a2) * costs.reach_cm[1])
     if spare_a > half + 1e-9 and spare_b > half + 1e-9:
         return True

@@ -6,6 +6,7 @@ free for the whole arm by a bound on its motion (`planarm.workspace.joint_proof`
 straight.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from math import ceil, floor, pi
@@ -76,17 +77,20 @@ class JointSearchResult:
     """Wall time in seconds, without compiling or loading kernels."""
 
 
-def find_joint_route(scene: Scene, margin_cm: float, spec: JointSpaceSpec | None = None) -> JointSearchResult:
+def find_joint_route(
+    scene: Scene, margin_cm: float, spec: JointSpaceSpec | None = None, closed: Sequence[tuple[float, float]] = ()
+) -> JointSearchResult:
     """Search a cheapest way between start and goal in joint space.
 
     Args:
         scene: a scene with a two-link arm.
         margin_cm: least distance of a link's centre line to an obstacle.
         spec: how to search; None takes the scene's, or the defaults.
+        closed: half lines in joint space that no move may cross: theta1 in radians, and the sign of theta2.
     """
     spec = spec or scene.joint_space or JointSpaceSpec()
     world = joint_world(scene, margin_cm)
-    costs = _costs(scene, spec)
+    costs = _costs(scene, spec, closed)
     _load_kernels(world, costs)
     began_s = perf_counter()
     starts = _poses(scene, scene.task.start_cm, spec.start_elbow)
@@ -122,12 +126,13 @@ def tip_points_cm(scene: Scene, poses_rad: Floats) -> Floats:
     return tips
 
 
-def _costs(scene: Scene, spec: JointSpaceSpec) -> Costs:
+def _costs(scene: Scene, spec: JointSpaceSpec, closed: Sequence[tuple[float, float]]) -> Costs:
     return Costs(
         OBJECTIVES[spec.objective],
         np.array([joint.max_speed_rad_s for joint in scene.joints]),
         spec.elbow_change_cost,
         np.array([sum(scene.arm.link_lengths_cm), scene.arm.link_lengths_cm[1]]),
+        np.array(closed, np.float64).reshape(-1, 2),
     )
 
 
