@@ -24,7 +24,6 @@ from planarm.link.exchange import StreamResult, stream_plan
 from planarm.link.transport import PinTrace, Transport, open_transport
 from planarm.model.arm import Arm
 from planarm.model.kinematics import forward
-from planarm.model.transmission import motor_axes
 from planarm.plan import Findings, Plan
 from planarm.plan_file import StoredPlan
 from planarm.route import find_route
@@ -32,8 +31,10 @@ from planarm.run_folder import begin_run_folder, finish_run_folder
 from planarm.scene import Scene
 from planarm.search.path import Path as TipPath
 from planarm.stepping.certify import Certificate, certify
-from planarm.stepping.quantise import quantisation_bound_cm, quantise
-from planarm.stepping.segments import Coding, SegmentPlan, compress, expand
+from planarm.stepping.quantise import quantisation_bound_cm
+from planarm.stepping.schedule import schedule
+from planarm.stepping.segments import SegmentPlan, expand
+from planarm.stepping.slowing import SpeedLimit
 from planarm.summary import summarise
 from planarm.trajectory.binding import report_timing
 from planarm.trajectory.limits import Limits
@@ -69,14 +70,9 @@ def plan_scene(scene: Scene, notice: Notice) -> Plan:
     if scene.planner.objective == "time":
         trajectory = optimised(scene, margin_cm, trajectory, limits, notice)
         path = TipPath.through(tip_curve_cm(trajectory, Arm.from_spec(scene.arm)), path.elbow)
-    if trajectory.duration_s > LONGEST_MOTION_S:
-        raise TimingError(
-            f"{scene.source}: the motion would take {trajectory.duration_s:.6g} s, {LONGEST_MOTION_S:g} s are the "
-            "most; raise joints.max_speed_deg_s or joints.max_acceleration_deg_s2, or move task.goal_cm nearer"
-        )
+    fastest = trajectory
     notice("plan", 0.6)
-    train = quantise(trajectory, scene.joints, scene.coupling)
-    segments = compress(train, Coding.of(motor_axes(scene.joints, scene.coupling)))
+    trajectory, train, segments = schedule(scene, lambda limit: timed(scene, fastest, limits, limit))
     notice("plan", 0.8)
     certificate = certify(scene, trajectory, train, segments)
     notice("plan", 1.0)
@@ -94,6 +90,21 @@ def plan_scene(scene: Scene, notice: Notice) -> Plan:
         search_ms=1e3 * route.search_s,
         joint=route.joint,
     )
+
+
+def timed(scene: Scene, fastest: Trajectory, limits: Limits, limit: SpeedLimit | None) -> Trajectory:
+    """Return the motion along a path timed before, under a further limit of its speed.
+
+    Raises:
+        TimingError: It takes too long to be looked at.
+    """
+    trajectory = fastest if limit is None else fastest_motion(fastest.path, limits, limit)
+    if trajectory.duration_s > LONGEST_MOTION_S:
+        raise TimingError(
+            f"{scene.source}: the motion would take {trajectory.duration_s:.6g} s, {LONGEST_MOTION_S:g} s are the "
+            "most; raise joints.max_speed_deg_s or joints.max_acceleration_deg_s2, or move task.goal_cm nearer"
+        )
+    return trajectory
 
 
 def optimised(scene: Scene, margin_cm: float, known: Trajectory, limits: Limits, notice: Notice) -> Trajectory:

@@ -16,10 +16,10 @@ import planarm
 from planarm.errors import CertificateError, PlanFileError
 from planarm.output import writing
 from planarm.stepping.certify import Certificate, Check
-from planarm.stepping.segments import SegmentPlan
+from planarm.stepping.plan import Allowance, SegmentPlan
 from planarm_wire.messages import SPEC_HASH, Move, Segment
 
-FORMAT = 1
+FORMAT = 2
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,6 +92,7 @@ def _to_json(plan: StoredPlan) -> dict[str, Any]:
         "start_usteps": plan.segments.start_usteps,
         "duration_ticks": plan.segments.duration_ticks,
         "segments": [_segment_to_json(segment) for segment in plan.segments.segments],
+        "allowances": [[one.slow_per_s, one.fast_per_s, one.need_ticks] for one in plan.segments.allowances],
         "certificate": [
             {name: getattr(check, name) for name in Check.__dataclass_fields__} for check in plan.certificate.checks
         ],
@@ -103,6 +104,7 @@ def _from_json(body: Mapping[str, Any]) -> StoredPlan:
         segments=tuple(_segment_from_json(row) for row in body["segments"]),
         duration_ticks=body["duration_ticks"],
         start_usteps=tuple(body["start_usteps"]),
+        allowances=tuple(Allowance(*one) for one in body["allowances"]),
     )
     return StoredPlan(
         scene=body["scene"],

@@ -17,8 +17,9 @@ from planarm.search.grid_search import find_path
 from planarm.smoothing.blend import blend_corners
 from planarm.stepping.certify import Certificate, Check, certify
 from planarm.stepping.clearance import clearances_cm, joint_positions_cm
-from planarm.stepping.quantise import quantisation_bound_cm, quantise
-from planarm.stepping.segments import Coding, compress, expand
+from planarm.stepping.quantise import quantisation_bound_cm
+from planarm.stepping.schedule import schedule
+from planarm.stepping.segments import expand
 from planarm.stepping.train import StepTrain
 from planarm.trajectory.timing import time_path
 from planarm.workspace.free_map import build_free_map
@@ -33,9 +34,8 @@ def planned(scene):
     free_map = build_free_map(scene, margin_cm)
     found = find_path(free_map, scene.task.start_cm, scene.task.goal_cm, scene.planner)
     assert found.path is not None, found.reason
-    trajectory = time_path(blend_corners(found.path, free_map), scene.joints)
-    train = quantise(trajectory, scene.joints)
-    return trajectory, train, compress(train, Coding.of(scene.joints))
+    path = blend_corners(found.path, free_map)
+    return schedule(scene, lambda limit: time_path(path, scene.joints, speed_cap=limit))
 
 
 @pytest.fixture(scope="module")
@@ -156,7 +156,7 @@ def shorter_intervals(segments):
 
 def bent(segments):
     k = busy(segments)
-    return with_move(segments, k, 0, add_q16=segments[k].moves[0].add_q16 + 65536)
+    return with_move(segments, k, 0, add_q16=segments[k].moves[0].add_q16 + 20 * 65536)
 
 
 def doubled(segments):
@@ -211,8 +211,8 @@ def test_every_change_of_the_segments_turns_it_red(scene, plan, change, name):
 @pytest.mark.parametrize(
     ("field", "value", "name"),
     [
-        ("max_speed_rad_s", 1.99, "joint 2 planned speed"),
-        ("max_speed_rad_s", 1.99, "joint 2 step interval"),
+        ("max_speed_rad_s", 1.0, "joint 2 planned speed"),
+        ("max_speed_rad_s", 1.0, "joint 2 step interval"),
         ("max_acceleration_rad_s2", 7.9, "joint 2 planned acceleration"),
         ("max_acceleration_rad_s2", 7.6, "joint 2 acceleration of the steps"),
         ("microsteps", 32, "joint 2 deviation"),

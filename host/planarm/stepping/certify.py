@@ -11,6 +11,7 @@ from planarm.stepping.check_board import check_board
 from planarm.stepping.check_motion import Planned, check_deviation, check_limits
 from planarm.stepping.check_space import check_space
 from planarm.stepping.check_steps import check_counts, check_gaps
+from planarm.stepping.check_stop import check_stop
 from planarm.stepping.check_torque import check_torque
 from planarm.stepping.check_wire import check_calm, check_wire
 from planarm.stepping.expand import expand
@@ -45,6 +46,7 @@ def certify(scene: Scene, trajectory: Trajectory, train: StepTrain, plan: Segmen
         planned = Planned.of(trajectory)
         checks += check_limits(planned, scene.joints)
         checks += check_torque(planned, scene)
+        checks += check_stop(plan, table, planned, scene)
     checks += check_deviation(trajectory, scene, made, at)
     checks += check_space(scene, made, at)
     return Certificate(tuple(checks))

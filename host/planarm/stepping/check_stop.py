@@ -1,0 +1,128 @@
+"""Certificate: the arm can come to rest on the path from anywhere, within the segments that the device holds.
+
+The allowances that travel with the plan are held against slowings found from the planned angles alone, by differences,
+and against stops integrated in continuous time; the device, which changes the clock from segment to segment, takes
+longer.
+"""
+
+import numpy as np
+
+from planarm.model.transmission import Transmission, motor_axes
+from planarm.scene import Scene
+from planarm.stepping.certificate import Check, Verdict, at_least, at_most
+from planarm.stepping.check_motion import Planned
+from planarm.stepping.plan import SegmentPlan
+from planarm.stepping.slowing import LINK_MARGIN_TICKS
+from planarm.stepping.table import SegmentTable
+from planarm.stepping.train import Floats, Ticks
+from planarm_wire.kernel_cache import kernel
+from planarm_wire.messages import QUEUE_SLOTS, TICKS_HZ
+
+ROUNDING = 0.02
+"""Differences see accelerations a tenth of a millisecond wide, and the planner's at a point."""
+
+MOST_RATE_PER_S = 1000.0
+
+
+def check_stop(plan: SegmentPlan, table: SegmentTable, planned: Planned, scene: Scene) -> list[Check]:
+    """Check each segment's allowances, and that every stop fits."""
+    told = np.array([(one.slow_per_s, one.fast_per_s, one.need_ticks) for one in plan.allowances]).reshape(-1, 3)
+    missing = abs(len(told) - len(plan.segments))
+    checks = [at_most("segments without allowance", missing, 0, "segments")]
+    if missing or not len(told):
+        return checks
+    starts = table.starts
+    setting = "joints.max_acceleration_deg_s2"
+    for name, column, sign in (("slowing", 0, 1.0), ("speeding up", 1, -1.0)):
+        largest = _least_in(_largest_changes(planned, scene, sign), planned.t_s[1:-1], starts / TICKS_HZ)
+        beyond = told[:, column] / np.maximum(largest, 1e-9)
+        k = int(np.argmax(beyond))
+        where = f"segment {k}, {_time(starts[k])}"
+        told_of = f"allowed {name} of the path, share of what the joints can"
+        checks.append(at_most(told_of, beyond[k], 1.0 + ROUNDING, "", where, setting))
+    needs_s = told[:, 2] / TICKS_HZ
+    shortest = np.array(_stops_s(planned, scene, starts[:-1] / TICKS_HZ))
+    longest_s = float(table.durations.max()) / TICKS_HZ
+    k = int(np.argmax(shortest - needs_s))
+    where = f"segment {k}, {_time(starts[k])}"
+    checks.append(
+        at_most("path time to rest beyond what is told", shortest[k] - needs_s[k], longest_s, "s", where, setting)
+    )
+    checks.append(_check_fit(table, needs_s))
+    return checks
+
+
+def _check_fit(table: SegmentTable, needs_s: Floats) -> Check:
+    """Check the path time in a full queue less that of a stop, where the queue does not hold all that is left.
+
+    Amber at worst: where the road is too short the device slows down by itself until it is not, so it stays on the
+    path, but later than planned.
+    """
+    starts, last = table.starts, len(table.durations)
+    name, setting = "road left after a stop", "joints.max_speed_deg_s or joints.max_acceleration_deg_s2"
+    spare = [(float("inf"), 0)]
+    for k, end in enumerate(_queue_ends(table)):
+        if end < last:
+            spare.append((int(starts[end] - starts[k] - LINK_MARGIN_TICKS) / TICKS_HZ - float(needs_s[k]), k))
+    least, k = min(spare)
+    if least == float("inf"):
+        return at_least(name, float(starts[-1]) / TICKS_HZ, 0.0, "s", "the queue holds the whole rest of the motion")
+    verdict: Verdict = "green" if least >= 0.0 else "amber"
+    return Check(name, least, 0.0, "s", verdict, f"segment {k}, {_time(starts[k])}", setting)
+
+
+def _queue_ends(table: SegmentTable) -> list[int]:
+    """Return for each segment the first one that a full queue does not hold when it starts."""
+    return [min(k + QUEUE_SLOTS, len(table.durations)) for k in range(len(table.durations))]
+
+
+def _largest_changes(planned: Planned, scene: Scene, sign: float) -> Floats:
+    """Return the largest slowing (sign 1) or speeding up (-1) of the path clock at each inner time, 1/s."""
+    speeds = 0.5 * (planned.speeds_rad_s[1:] + planned.speeds_rad_s[:-1])
+    most = np.full(len(speeds), MOST_RATE_PER_S)
+    for j, joint in enumerate(scene.joints):
+        braking = -sign * planned.accelerations_rad_s2[:, j] * np.sign(speeds[:, j])
+        room = np.maximum(0.0, joint.max_acceleration_rad_s2 - np.maximum(0.0, braking))
+        most = np.minimum(most, room / np.maximum(np.abs(speeds[:, j]), 1e-12))
+    return most
+
+
+def _least_in(values: Floats, t_s: Floats, borders_s: Floats) -> Floats:
+    """Return the least value in each segment, infinity where it has none.
+
+    A value at t is that of differences over its neighbours, so all three have to lie in the segment.
+    """
+    step_s = t_s[1] - t_s[0]
+    first = np.searchsorted(t_s, borders_s[:-1] + step_s)
+    after = np.searchsorted(t_s, borders_s[1:] - step_s, side="right")
+    ranges = zip(first.tolist(), after.tolist(), strict=True)
+    return np.array([values[a:b].min() if a < b else np.inf for a, b in ranges])
+
+
+def _stops_s(planned: Planned, scene: Scene, starts_s: Floats) -> Floats:
+    """Return the path time of a stop from each start with all of the slowing there is."""
+    speeds = 0.5 * (planned.speeds_rad_s[1:] + planned.speeds_rad_s[:-1])
+    over = np.zeros(len(speeds))
+    rates = np.abs(Transmission.of(scene).rates(speeds))
+    for motor, axis in enumerate(motor_axes(scene.joints, scene.coupling)):
+        over = np.maximum(over, rates[:, motor] / np.sqrt(2.0 * axis.max_acceleration_rad_s2 * axis.usteps_per_rad))
+    first: Ticks = np.searchsorted(planned.t_s[1:-1], starts_s)
+    return integrate_stops(_largest_changes(planned, scene, 1.0), over, first, float(planned.t_s[1]))
+
+
+@kernel
+def integrate_stops(slow_per_s: Floats, over: Floats, first: Ticks, step_s: float) -> Floats:
+    """Return the path time of stops: along the path d(u^2)/d tau = -2 slow, at rest where over u is at most 1."""
+    needs = np.zeros(first.shape[0])
+    for k in range(first.shape[0]):
+        squared = 1.0
+        for i in range(first[k], slow_per_s.shape[0]):
+            if over[i] * over[i] * squared <= 1.0:
+                break
+            squared = max(0.0, squared - 2.0 * slow_per_s[i] * step_s)
+            needs[k] += step_s
+    return needs
+
+
+def _time(tick: int) -> str:
+    return f"{tick / TICKS_HZ:.6f} s"

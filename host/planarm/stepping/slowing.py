@@ -1,0 +1,110 @@
+"""Slow a motion down where a stop would take more path than the device holds.
+
+The device can come to rest on the path only within the segments in its queue. Where the path time to rest and the
+link's margin are longer than those last, the motion there gets an upper limit of its speed along the path, a little
+lower than before, and is timed anew, until every stop fits.
+"""
+
+from dataclasses import dataclass
+from typing import Self
+
+import numpy as np
+
+from planarm.scene import Scene
+from planarm.stepping.plan import SegmentPlan
+from planarm.stepping.stopping import allowances, held_until
+from planarm.stepping.table import SegmentTable, segment_bytes, table_of
+from planarm.stepping.train import Floats
+from planarm.trajectory.motion import Trajectory
+from planarm_wire.messages import TICKS_HZ
+
+LINK_MARGIN_TICKS = 240_000
+"""15 ms: what may be missing of a full queue, since a reply takes up to 10 ms and a segment on its way 4 ms."""
+
+SLICE_TICKS = 65_536
+
+LEAST_FACTOR = 0.95
+MOST_FACTOR = 0.98
+GENTLE = 0.3
+"""Bounds of one round's change of speed, and the power of what is missing that it takes: many small changes end at a
+faster motion than a few large ones, since a stop's length depends on the motion ahead, too."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SpeedLimit:
+    """An upper limit of ds/dt along a path, linear between points.
+
+    Attributes:
+        s: path parameters, ascending, shape (n,).
+        rate: the limit at each.
+    """
+
+    s: Floats
+    rate: Floats
+
+    def __call__(self, s: Floats) -> Floats:
+        """Return the limit at each s."""
+        return np.asarray(np.interp(s, self.s, self.rate))
+
+    @classmethod
+    def lower(cls, trajectory: Trajectory, times_s: Floats, factors: Floats, before: Self | None) -> Self:
+        """Return a limit that slows a motion by factors given at times in it; 1 changes nothing."""
+        s = _path_parameter(trajectory, times_s)
+        unlimited = 10.0 * float(trajectory.s_dot.max())
+        speed = np.interp(s, trajectory.s, trajectory.s_dot)
+        rate = np.where(factors < 1.0, factors * speed, unlimited)
+        keep = np.concatenate([[True], np.diff(s) > 0.0])
+        s, rate = s[keep], np.maximum(rate[keep], 1e-3 * unlimited)
+        return cls(s, rate if before is None else np.minimum(rate, before(s)))
+
+
+def shortfall_ticks(plan: SegmentPlan, table: SegmentTable) -> Floats:
+    """Return how much path time is missing at the start of each segment for a stop from there; negative where none is.
+
+    Where all of what is left is in the queue nothing is missing: the motion ends at rest.
+    """
+    starts = table.starts
+    held = held_until(starts, segment_bytes(table))
+    needs = np.array([allowance.need_ticks for allowance in plan.allowances])
+    spare = held - starts[:-1] - needs - LINK_MARGIN_TICKS
+    return np.where(held < starts[-1], -spare, -float(starts[-1]))
+
+
+def missing_road_ticks(plan: SegmentPlan) -> float | None:
+    """Return how much path the device holds where stops do not fit, on average; None where all stops fit."""
+    if not plan.allowances:
+        return None
+    table = table_of(plan)
+    lacking = shortfall_ticks(plan, table) > 0.0
+    if not lacking.any():
+        return None
+    starts = table.starts
+    return float((held_until(starts, segment_bytes(table)) - starts[:-1])[lacking].mean())
+
+
+def slower(trajectory: Trajectory, scene: Scene, road_ticks: float, before: SpeedLimit | None) -> SpeedLimit | None:
+    """Return a lower limit of the speed where a stop takes more than a road of this length; None where none does.
+
+    The motion is looked at in slices of the longest segment that a fast motor may have.
+    """
+    count = -(-int(trajectory.duration_s * TICKS_HZ) // SLICE_TICKS)
+    needs = np.array([one.need_ticks for one in allowances(trajectory, scene, [SLICE_TICKS] * count)])
+    starts = SLICE_TICKS * np.arange(count + 1)
+    fits = (road_ticks - LINK_MARGIN_TICKS) / np.maximum(needs, 1.0)
+    lacking = np.flatnonzero((fits < 1.0) & (starts[:-1] + road_ticks < starts[-1]))
+    if not len(lacking):
+        return None
+    factors = np.ones(len(starts))
+    for k in lacking.tolist():
+        end = int(np.searchsorted(starts, starts[k] + needs[k]))
+        factors[k : end + 1] = np.minimum(factors[k : end + 1], np.clip(fits[k] ** GENTLE, LEAST_FACTOR, MOST_FACTOR))
+    return SpeedLimit.lower(trajectory, starts / TICKS_HZ, factors, before)
+
+
+def _path_parameter(trajectory: Trajectory, times_s: Floats) -> Floats:
+    """Return where the motion is at each time."""
+    t = np.clip(times_s, 0.0, trajectory.duration_s)
+    i = np.clip(np.searchsorted(trajectory.t_s, t, side="right") - 1, 0, len(trajectory.t_s) - 2)
+    since = t - trajectory.t_s[i]
+    s = trajectory.s[i] + since * (trajectory.s_dot[i] + 0.5 * trajectory.s_ddot[i] * since)
+    return np.asarray(np.clip(s, trajectory.s[i], trajectory.s[i + 1]))
