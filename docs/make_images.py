@@ -8,10 +8,12 @@ from pathlib import Path
 
 import numpy as np
 
+from planarm.envelope.maps import envelope_maps
 from planarm.experiments.pictures import draw_paper_stencils, draw_path
 from planarm.model.arm import Arm
 from planarm.model.kinematics import forward
 from planarm.pipeline import plan_scene
+from planarm.report.envelope import draw_envelope
 from planarm.scene import load_scene
 
 DOCS = Path(__file__).resolve().parent
@@ -23,7 +25,15 @@ def make_images(folder: Path) -> list[Path]:
     files = [folder / "stencils.png", folder / "table1_case1.png"]
     draw_paper_stencils(files[0])
     _draw_plan(DOCS.parent / "examples" / "table1_case1.toml", files[1])
+    files.append(folder / "envelope.png")
+    _draw_envelope(DOCS.parent / "examples" / "table1_case1.toml", files[-1])
     return files
+
+
+def _draw_envelope(scene_file: Path, target: Path) -> None:
+    """Draw the maps that `planarm envelope` makes of a scene."""
+    scene = load_scene(scene_file)
+    draw_envelope(target, envelope_maps(scene, "up"), scene.name, scene.arm.base_cm)
 
 
 def _draw_plan(scene_file: Path, target: Path) -> None:

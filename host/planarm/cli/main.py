@@ -93,6 +93,7 @@ def build_parser() -> argparse.ArgumentParser:
     _add_plan(commands)
     _add_run(commands)
     _add_stream(commands)
+    _add_envelope(commands)
     _add_emulate(commands)
     _add_compare(commands)
     _add_timing(commands)
@@ -135,6 +136,16 @@ def _add_stream(commands: Commands) -> None:
     command = commands.add_parser("stream", help="stream a certified plan", epilog=EXIT_CODES)
     command.add_argument("plan", metavar="FILE.plan")
     _add_port(command)
+    _add_json(command)
+
+
+def _add_envelope(commands: Commands) -> None:
+    command = commands.add_parser(
+        "envelope", help="map accuracy and speed over the workspace; largest payload and feed"
+    )
+    _add_scene(command)
+    command.add_argument("--out", metavar="DIR", help="folder for envelope.json and envelope.png")
+    command.add_argument("--maps-only", action="store_true", help="leave out payload and feed, which plan many times")
     _add_json(command)
 
 
