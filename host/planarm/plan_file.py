@@ -8,13 +8,14 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
 import planarm
 from planarm.errors import CertificateError, PlanFileError
 from planarm.output import writing
+from planarm.scene import Scene
 from planarm.stepping.certify import Certificate, Check
 from planarm.stepping.plan import Allowance, SegmentPlan
 from planarm_wire.messages import SPEC_HASH, Move, Segment
@@ -81,11 +82,41 @@ def load_plan(path: Path) -> StoredPlan:
     return _from_json(body)
 
 
+def arm_hash(scene: Mapping[str, Any]) -> str:
+    """Return a hash of the arm that a scene's plain data describe: links, joints with their motors, coupling, masses.
+
+    Two scenes with the same arm among other obstacles, with another task or planner, have the same.
+    """
+    arm = {key: scene[key] for key in ("arm", "joints", "coupling", "mechanics")}
+    return _digest({"arm": json.loads(json.dumps(arm))})
+
+
+def require_arm(plan: StoredPlan, scene: Scene, name: str) -> None:
+    """Check that a plan was made for the arm of a scene.
+
+    Raises:
+        CertificateError: It was made for another arm.
+    """
+    theirs = asdict(scene)
+    if arm_hash(plan.scene) == arm_hash(theirs):
+        return
+    differ = [key for key in ("arm", "joints", "coupling", "mechanics") if not _alike(plan.scene[key], theirs[key])]
+    raise CertificateError(
+        f"{name}: was made for another arm than that of {scene.source} ({', '.join(differ)} differ); plan it anew"
+    )
+
+
+def _alike(one: object, other: object) -> bool:
+    """Tell whether two pieces of a scene are the same once written as JSON."""
+    return bool(json.loads(json.dumps(one)) == json.loads(json.dumps(other)))
+
+
 def _to_json(plan: StoredPlan) -> dict[str, Any]:
     return {
         "format": FORMAT,
         "planarm": planarm.__version__,
         "spec_hash": SPEC_HASH,
+        "arm_hash": arm_hash(plan.scene),
         "scene": plan.scene,
         "path_points_cm": plan.path_points_cm,
         "motion_s": plan.motion_s,

@@ -135,6 +135,7 @@ def _add_run(commands: Commands) -> None:
 def _add_stream(commands: Commands) -> None:
     command = commands.add_parser("stream", help="stream a certified plan", epilog=EXIT_CODES)
     command.add_argument("plan", metavar="FILE.plan")
+    command.add_argument("--arm", metavar="SCENE", help="the arm that is connected: a plan for another one is refused")
     _add_port(command)
     _add_json(command)
 

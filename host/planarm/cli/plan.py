@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import json
 from collections.abc import Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -36,6 +37,7 @@ def execute(options: argparse.Namespace) -> int:
     from planarm.output import require_place
     from planarm.pipeline import plan_scene, stored
     from planarm.plan_file import save_plan
+    from planarm.report.tables import certificate_table
     from planarm.warm_up import warm_up
 
     target = Path(options.output)
@@ -46,6 +48,9 @@ def execute(options: argparse.Namespace) -> int:
         notice("kernels", 1.0)
         plan = plan_scene(scene, notice)
     save_plan(stored(plan), target)
+    rows = [asdict(check) for check in plan.certificate.checks]
+    if not options.json:
+        terminal().print(certificate_table(rows))
     if not plan.certificate.ok:
         raise CertificateError(f"{target}: {plan.certificate.explain()}")
     told: dict[str, Any] = {
@@ -54,6 +59,7 @@ def execute(options: argparse.Namespace) -> int:
         **plan.timing.figures(),
         "segments": len(plan.segments.segments),
         "plan_ms": plan.plan_ms,
+        "certificate": rows,
     }
     if options.alternatives:
         told["routes"] = routes

@@ -17,9 +17,12 @@ def execute(options: argparse.Namespace) -> int:
     from planarm.link.position import moved_usteps
     from planarm.link.transport import open_transport
     from planarm.pipeline import stream
-    from planarm.plan_file import load_plan
+    from planarm.plan_file import load_plan, require_arm
+    from planarm.scene import load_scene
 
     plan = load_plan(Path(options.plan))
+    if options.arm is not None:
+        require_arm(plan, load_scene(Path(options.arm)), options.plan)
     link = plan.scene["link"]
     port = link["port"] if options.port is None else options.port
     with progress(options.json) as notice, closing(open_transport(port, link["baud"])) as transport:

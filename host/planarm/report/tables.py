@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from numbers import Integral, Real
 from typing import TYPE_CHECKING, Any, Final
 
@@ -42,6 +42,37 @@ def summary_table(summary: Mapping[str, Any], title: str | None = None) -> Table
     table.add_column(overflow="fold")
     for name, value in _rows(summary, ""):
         table.add_row(name, value)
+    return table
+
+
+VERDICT_STYLES: Final = {"green": "green", "amber": "yellow", "red": "bold red"}
+
+
+def certificate_table(checks: Sequence[Mapping[str, Any]], title: str | None = None) -> Table:
+    """Return a certificate as a table: each check with its verdict, value, limit, place, and what to change.
+
+    Args:
+        checks: mappings with name, value, limit, unit, verdict, where and setting.
+        title: above the table.
+    """
+    from rich import box
+    from rich.markup import escape
+    from rich.table import Table
+
+    table = Table(title=title, box=box.SIMPLE_HEAD, title_justify="left", pad_edge=False, padding=(0, 1, 0, 0))
+    for name, style in (("", ""), ("check", ""), ("value", ""), ("limit", "dim"), ("where", "dim"), ("change", "dim")):
+        table.add_column(name, style=style, justify="right" if name in ("value", "limit") else "left", overflow="fold")
+    for check in checks:
+        verdict = str(check["verdict"])
+        unit = f" {check['unit']}" if check["unit"] else ""
+        table.add_row(
+            f"[{VERDICT_STYLES[verdict]}]{verdict}[/]",
+            escape(str(check["name"])),
+            f"{float(check['value']):.5g}{unit}",
+            f"{float(check['limit']):.5g}",
+            escape(str(check["where"])),
+            escape(str(check["setting"])) if verdict != "green" else "",
+        )
     return table
 
 
