@@ -182,8 +182,8 @@ def test_counts_are_exact_over_many_steps(seed, sized):
     joints = []
     for _ in range(2):
         count = sized(60_000, 600_000)
-        wander = np.cumsum(rng.normal(0.0, 0.003, count))
-        gaps = np.clip(800.0 * np.exp(np.abs(wander) * 3.0), 800, 80_000).astype(np.int64)
+        wander = np.abs((np.cumsum(rng.normal(0.0, 0.003, count)) + 1.5) % 3.0 - 1.5)  # between 0 and 1.5, to and fro
+        gaps = (800.0 * np.exp(3.0 * wander)).astype(np.int64)
         directions = np.where(np.cumsum(rng.random(count) < 2e-4) % 2 == 0, 1, -1)
         gaps[1:][np.diff(directions) != 0] += 50_000
         gaps[0] += 320
