@@ -18,7 +18,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from planarm_sim.cpu.chip import Chip, StopCause
+from planarm_sim.cpu.chip import Chip, Snapshot, StopCause
 from sim_chip.avr_assembler import assemble, encode
 
 WORDS, SRAM_BYTES, ROW = 16384, 2048, 36
@@ -152,6 +152,14 @@ def random_state(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray, int,
     )
 
 
+def begin(chip: Chip, power_up: Snapshot, registers: np.ndarray, sram: np.ndarray, at: tuple[int, int, int]) -> None:
+    """Bring the chip to a state; `at` is PC, SREG, SP."""
+    chip.restore(power_up)
+    chip.registers[:] = registers
+    chip.sram[:] = sram
+    chip.pc, chip.sreg, chip.sp = at
+
+
 def test_random_programs_step_by_step(simavr, sized):
     programs = sized(SMALL, FULL)
     rng = np.random.default_rng(328)
@@ -167,10 +175,7 @@ def test_random_programs_step_by_step(simavr, sized):
             after = sram.copy()
             pointers = [a.ctypes.data_as(ctypes.c_void_p) for a in (starts, registers, after, trace)]
             done = simavr.shim_run(image, pointers[0], pointers[1], pointers[2], pc, sreg, sp, STEPS, pointers[3])
-            chip.restore(power_up)
-            chip.registers[:] = registers
-            chip.sram[:] = sram
-            chip.pc, chip.sreg, chip.sp = pc, sreg, sp
+            begin(chip, power_up, registers, sram, (pc, sreg, sp))
             for step in range(done):
                 assert chip.run_to(chip.cycle + 1) is StopCause.REACHED
                 mine[step, :4] = chip.pc, chip.cycle, chip.sreg, chip.sp
@@ -178,6 +183,11 @@ def test_random_programs_step_by_step(simavr, sized):
             different = np.nonzero((mine[:done] != trace[:done]).any(axis=1))[0]
             assert not different.size, explain(int(different[0]), pc, image, mine, trace)
             np.testing.assert_array_equal(chip.sram, after)
+            if done:  # once more without a stop, where pairs run in one go (`cpu/fusion.py`)
+                begin(chip, power_up, registers, sram, (pc, sreg, sp))
+                chip.run_to(int(trace[done - 1, 1]))
+                assert [chip.pc, chip.cycle, chip.sreg, chip.sp, *chip.registers] == trace[done - 1].tolist()
+                np.testing.assert_array_equal(chip.sram, after)
             total += done
     assert total > 45_000 * programs
 

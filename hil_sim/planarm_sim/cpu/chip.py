@@ -153,7 +153,7 @@ class Chip:
                 return cause
         if self._watcher is not None:
             return self._watcher.advance(self._state, self._memory, self._words, self._seen, target)
-        return int(run(self._state, self._memory, self._words, self._seen.code, self._seen.flash, target))
+        return int(run(self._state, self._memory, self._words, self._seen.fused, self._seen.flash, target))
 
     def watch(self, watcher: Watcher | None) -> None:
         """Have the chip run by `watcher`, or as usual again. Interrupts already pending count as raised now."""

@@ -77,8 +77,77 @@ def run(st: State, memory: Bytes, words: State, code: State, flash: Bytes, targe
         pc += 1
         cycle += 1
 
+        # --- Pairs (see `fusion`): the second only when nothing is due before it --------------------------
+        if operation == op.PUSH2:
+            offset = st[SP] - LOWEST_PUSH
+            value = st[(word >> 8) & 0xFF]
+            if 0 <= offset < SRAM_BYTES - 1 and cycle + 1 < st[LOOK_AT]:
+                memory[offset + 1] = value
+                memory[offset] = st[(word >> 16) & 0xFFFF]
+                st[SP] -= 2
+                st[STORES] += 1
+                pc += 1
+                cycle += 2
+            else:
+                address = st[SP]
+                st[SP] = (address - 1) & 0xFFFF
+                offset = address - SRAM_START
+                if 0 <= offset < SRAM_BYTES:
+                    memory[offset] = value
+                    st[STORES] += 1
+                else:
+                    note_access(st, io.WRITE, address, value, pc - 1)
+            cycle += 1
+        elif operation == op.POP2:
+            offset = st[SP] - LOWEST_POP
+            if 0 <= offset < SRAM_BYTES - 1 and cycle + 1 < st[LOOK_AT]:
+                st[(word >> 8) & 0xFF] = memory[offset]
+                st[(word >> 16) & 0xFFFF] = memory[offset + 1]
+                st[SP] += 2
+                pc += 1
+                cycle += 2
+            else:
+                address = (st[SP] + 1) & 0xFFFF
+                st[SP] = address
+                offset = address - SRAM_START
+                if 0 <= offset < SRAM_BYTES:
+                    st[(word >> 8) & 0xFF] = memory[offset]
+                else:
+                    note_access(st, io.READ, address, (word >> 8) & 0xFF, pc - 1)
+            cycle += 1
+        elif operation == op.MOV2:
+            st[(word >> 8) & 0xFF] = st[(word >> 16) & 0xFFFF]
+            if cycle < st[LOOK_AT]:
+                st[(word >> 32) & 0xFF] = st[(word >> 40) & 0xFFFF]
+                pc += 1
+                cycle += 1
+        elif operation == op.LDS2:
+            st[(word >> 8) & 0xFF] = memory[((word >> 32) & 0xFFFF) - SRAM_START]
+            pc += 1
+            cycle += 1
+            if cycle < st[LOOK_AT]:
+                st[(word >> 16) & 0xFFFF] = memory[((word >> 48) & 0xFFFF) - SRAM_START]
+                pc += 2
+                cycle += 2
+        elif operation == op.COMPARE_BRANCH:
+            a = st[(word >> 8) & 0xFF]
+            b = st[(word >> 16) & 0xFFFF]
+            total = a - b
+            sreg = (sreg & KEEP_IT) | (st[RESULT_FLAGS + (total & 0xFF)] ^ st[CARRY_FLAGS + ((a ^ b ^ total) & 0x1FF)])
+            if cycle < st[LOOK_AT]:
+                pc += 1
+                cycle += 1
+                if ((sreg & (word >> 48) & 0xFF) != 0) == ((word >> 56) != 0):
+                    back = (word >> 32) & 0xFFFF < pc
+                    pc = (word >> 32) & 0xFFFF
+                    cycle += 1
+                    if back:
+                        st[LAST_BACK] = pc
+                        if pc == st[WATCHED]:
+                            note_turn(st)
+
         # --- What programs do most: arithmetic and logic -----------------------------------------------------
-        if operation == op.ADD:
+        elif operation == op.ADD:
             d = (word >> 8) & 0xFF
             a = st[d]
             b = st[(word >> 16) & 0xFFFF]

@@ -17,7 +17,8 @@ from __future__ import annotations
     COM, NEG, ASR, MUL, MULX, LPM, LPM_INC, LD_DEC, ST_DEC, BLD, BST, IJMP, ICALL,
     NOP, WRAP, SLEEP, WDR,
     BREAK, SPM,
-) = range(72)
+    PUSH2, POP2, MOV2, LDS2, COMPARE_BRANCH,
+) = range(77)
 # fmt: on
 
 D_SIGNED, R_SIGNED, FRACTIONAL = 1, 2, 4

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Self
 
 import numpy as np
@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from planarm_sim.cpu import opcodes as op
 from planarm_sim.cpu.decode import ERASED_WORD, FLASH_WORDS, decode, decode_part
+from planarm_sim.cpu.fusion import fuse
 from planarm_sim.cpu.layout import PAGE_WORDS
 
 NRWW_START_WORD = 0x3800
@@ -23,6 +24,7 @@ class Program:
     Attributes:
         flash: FLASH_BYTES bytes.
         code: one decoded word per word; see `decode`.
+        fused: the same with pairs fused, for the CPU loop; see `fusion`.
         erased_runs: erased words run as what they nearly are, SBRS r31, 7, as chips are known to do: an empty
             chip comes round to its boot loader. Otherwise they are undefined opcodes.
     """
@@ -30,6 +32,11 @@ class Program:
     flash: NDArray[np.uint8]
     code: NDArray[np.int64]
     erased_runs: bool
+    fused: NDArray[np.int64] = field(init=False)
+
+    def __post_init__(self) -> None:
+        """Fuse pairs for the CPU loop."""
+        object.__setattr__(self, "fused", fuse(self.code))
 
     @classmethod
     def of(cls, flash: NDArray[np.uint8], *, erased_runs: bool) -> Self:
