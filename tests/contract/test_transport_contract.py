@@ -67,13 +67,22 @@ def over_emulator(tmp_path) -> Iterator[Line]:
     yield Line(transport)
 
 
+def over_emulated_usb(tmp_path) -> Iterator[Line]:
+    transport = open_transport(f"sim://?usb=16u2&image={write_echo_image(tmp_path)}")
+    transport.clock.wait_until(0.001)
+    yield Line(transport)
+
+
 def over_memory(_tmp_path) -> Iterator[Line]:
     line = ModelLine()
     line.device.take_byte = lambda byte: line.from_device(bytes([byte])) and None
     yield Line(line)
 
 
-@pytest.fixture(params=[over_loop, over_pty, over_socket, over_emulator, over_memory], ids=lambda make: make.__name__)
+@pytest.fixture(
+    params=[over_loop, over_pty, over_socket, over_emulator, over_emulated_usb, over_memory],
+    ids=lambda make: make.__name__,
+)
 def line(request, tmp_path) -> Iterator[Line]:
     yield from request.param(tmp_path)
 
