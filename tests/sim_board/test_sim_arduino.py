@@ -13,14 +13,20 @@ SKETCHES = Path(__file__).parent / "sketches"
 MS = 16_000  # cycles
 
 
+@pytest.fixture(scope="session")
+def core_cache(request, tmp_path_factory):
+    """Where the built core is kept: over the runs, unless pytest was told to keep nothing."""
+    cache = getattr(request.config, "cache", None)
+    return cache.mkdir("arduino") if cache is not None else tmp_path_factory.mktemp("arduino")
+
+
 @pytest.fixture
-def sketch(request, tmp_path):
+def sketch(core_cache, tmp_path):
     """Build a sketch, power up a board with it, and let it set up."""
 
     def start(source, *libraries, baud=250_000, usb="direct", setup_s=0.01):
         path = SKETCHES / f"{source}.ino" if isinstance(source, str) else source
-        cache = request.config.cache.mkdir("arduino")
-        uno = Uno.from_elf(build_sketch(path, tmp_path, cache, libraries), baud=baud, usb=usb)
+        uno = Uno.from_elf(build_sketch(path, tmp_path, core_cache, libraries), baud=baud, usb=usb)
         uno.run(seconds=setup_s)
         return uno
 
