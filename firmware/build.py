@@ -94,8 +94,13 @@ def require_free_registers(elf: Path, flags: list[str]) -> None:
     """
     numbers = [flag.removeprefix("-ffixed-r") for flag in flags if flag.startswith("-ffixed-r")]
     kept = re.compile(rf"\br(?:{'|'.join(numbers)})\b")
-    for function in run(["avr-objdump", "-d", "--no-show-raw-insn", str(elf)]).split("\n\n"):
-        if "<__vector_" in function.split("\n", 1)[0]:
+    # Before __ctors_end are the vectors and the tables in flash, which are no code.
+    code = re.search(r"^([0-9a-f]+) \w __ctors_end$", run(["avr-nm", str(elf)]), re.M)
+    if code is None:
+        raise BuildError(f"{elf}: no __ctors_end, where the code begins")
+    disassemble = ["avr-objdump", "-d", "--no-show-raw-insn", f"--start-address=0x{code.group(1)}", str(elf)]
+    for function in run(disassemble).split("\n\n"):
+        if re.search(r"<(__vector_\d+|_ZN3hal\d+(set_)?step_fraction\w+)>", function.split("\n", 1)[0]):
             continue
         for line in function.splitlines()[1:]:
             address, _, instruction = line.partition(":\t")

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Protocol
 
 from planarm_sim import Uno
-from planarm_wire.codec import decode, encode
+from planarm_wire.codec import decode, encode, encoded_bytes
 from planarm_wire.framing import Frame, FrameDecoder, encode_frame
 from planarm_wire.messages import (
     BAUD,
@@ -23,7 +23,8 @@ from planarm_wire.messages import (
     ENABLE_PIN,
     JOINTS,
     PROTOCOL_VERSION,
-    QUEUE_SLOTS,
+    QUEUE_BYTES,
+    QUEUE_FRAME_BYTES,
     STEP_PINS,
     Clear,
     Enable,
@@ -34,12 +35,14 @@ from planarm_wire.messages import (
     Segment,
     Segments,
     Start,
+    State,
     Status,
     Welcome,
 )
 from planarm_wire.steps import direction, duration_ticks, expand_moves
 
 LEAD_TICKS = 20_000
+WAKE_TICKS = 340_000  # ENABLE, the mark in EEPROM, the drivers
 ANSWER_TICKS = 120_000  # the longest frame, what it asks for, and the answer, on the line one after the other
 REST = Move(0, 0, 0, 0)
 
@@ -49,10 +52,10 @@ class Delays:
     """How long things take on the simulated board, in ticks. The defaults are near the Uno's."""
 
     pass_ticks: int = 600
-    entry_ticks: int = 60
+    entry_ticks: int = 58
     late_entry_ticks: int = 0
     late_every: int = 0
-    leave_ticks: int = 45
+    leave_ticks: int = 16
 
 
 @dataclass(frozen=True)
@@ -130,6 +133,11 @@ class NativeFirmware:
         self._library.planarm_power_on.argtypes = (ctypes.c_uint32, ctypes.c_uint64, _Delays)
         self._library.planarm_receive.argtypes = (ctypes.c_char_p, ctypes.c_size_t)
         self._library.planarm_run.argtypes = (ctypes.c_uint64,)
+        for name in ("planarm_signal", "planarm_state"):
+            getattr(self._library, name).restype = ctypes.c_uint8
+        self._library.planarm_signal.argtypes = (ctypes.c_uint8,)
+        self._library.planarm_latch.argtypes = (ctypes.c_uint8,)
+        self._library.planarm_set_inputs.argtypes = (ctypes.c_uint8,)
         self._library.planarm_now.restype = ctypes.c_uint64
         self._library.planarm_take_sent.restype = ctypes.c_size_t
         self._library.planarm_take_edges.restype = ctypes.c_size_t
@@ -146,6 +154,22 @@ class NativeFirmware:
 
     def now(self) -> int:
         return int(self._library.planarm_now())
+
+    def signal(self, event: int) -> bool:
+        """Give the supervisor an event; tell whether its table has a row for it."""
+        return bool(self._library.planarm_signal(event))
+
+    def state(self) -> State:
+        """The supervisor's state."""
+        return State(self._library.planarm_state())
+
+    def latch(self, fault: int) -> None:
+        """Latch a fault."""
+        self._library.planarm_latch(fault)
+
+    def set_inputs(self, inputs: int) -> None:
+        """Set the inputs: bit j the limit switch of joint j, bit 7 the open stop input."""
+        self._library.planarm_set_inputs(inputs)
 
     def take_sent(self) -> bytes:
         buffer = ctypes.create_string_buffer(65_536)
@@ -214,34 +238,46 @@ class Board:
         return welcome
 
     def get_ready(self) -> Status:
-        """HELLO and ENABLE."""
+        """HELLO and ENABLE, and the time that the drivers take to wake."""
         self.hello()
-        return self.ask(Enable(1))
+        self.ask(Enable(1))
+        self.run(WAKE_TICKS)
+        return self.ask()
 
     def recover(self) -> Status:
-        """CLEAR and ENABLE."""
+        """CLEAR and ENABLE, and the time that the drivers take to wake."""
         self.ask(Clear())
-        return self.ask(Enable(1))
+        self.ask(Enable(1))
+        self.run(WAKE_TICKS)
+        return self.ask()
 
-    def stream(self, segments: Sequence[Segment], *, lead_ticks: int = LEAD_TICKS, slice_ticks: int = 8000) -> Status:
+    def stream(
+        self,
+        segments: Sequence[Segment],
+        *,
+        lead_ticks: int = LEAD_TICKS,
+        slice_ticks: int = 8000,
+        head: tuple[int, int, int] = (0, 0, 0),
+    ) -> Status:
         """Play a whole motion, one segment a frame, keeping the queue full; return the first STATUS after its end."""
         waiting = deque(segments)
         started = False
-        free = QUEUE_SLOTS
+        free = self.ask_now().free_bytes
         end = self.now + lead_ticks + sum(map(duration_ticks, segments)) + 10_000_000
         while self.now < end:
-            while waiting and free:
-                self.send(Segments((waiting.popleft(),)))
-                free -= 1
-                self.run(8000)
+            while waiting and free >= encoded_bytes(message := Segments(*head, (waiting[0],))):
+                self.send(message)
+                waiting.popleft()
+                free -= encoded_bytes(message) + QUEUE_FRAME_BYTES
+                self.run(8000 if started else 40_000)
             if not started:
                 self.send(Start(lead_ticks))
                 started = True
             self.run(slice_ticks)
             status = self.ask_now()
-            if status.state.name != "RUNNING":
+            if status.state not in (State.RUNNING, State.STARVED):
                 return status
-            free = status.free_slots
+            free = status.free_bytes
         raise AssertionError(f"the motion did not end: {status}")
 
     def ask_now(self) -> Status:
@@ -290,6 +326,11 @@ def run_of(
 def segment_of(duration: int, *moves: Move, last: bool = False) -> Segment:
     """A segment; joints without a move rest."""
     return Segment(2 * duration + last, (*moves, *(REST,) * (JOINTS - len(moves))))
+
+
+def room_after(*messages: Segments) -> int:
+    """What STATUS tells as free when these are queued."""
+    return QUEUE_BYTES - QUEUE_FRAME_BYTES - sum(encoded_bytes(m) + QUEUE_FRAME_BYTES for m in messages)
 
 
 def end_motion(segments: Iterable[Segment]) -> list[Segment]:

@@ -13,29 +13,37 @@ from dataclasses import dataclass, field, replace
 from itertools import count
 
 from planarm.errors import LinkError
-from planarm_wire.codec import decode, encode
+from planarm_wire.codec import decode, encode, encoded_bytes
 from planarm_wire.errors import WireError
 from planarm_wire.framing import Frame, FrameDecoder, encode_frame
 from planarm_wire.messages import (
+    HOLD_CODE,
+    JOINTS,
     MIN_INTERVAL_TICKS,
     PROTOCOL_VERSION,
-    QUEUE_SLOTS,
+    QUEUE_BYTES,
+    QUEUE_FRAME_BYTES,
     RX_RING_BYTES,
     SPEC_HASH,
     TICKS_HZ,
     Clear,
+    Config,
     Enable,
     Fault,
     Hello,
     Ledger,
     Move,
+    Override,
     Query,
+    Reset,
     Result,
+    Resume,
     Segment,
     Segments,
     Start,
     State,
     Status,
+    Stop,
     Welcome,
 )
 from planarm_wire.steps import direction, duration_ticks, is_last, step_ticks
@@ -109,6 +117,13 @@ class Device:
         self.ring: deque[int] = deque()
         self.decoder = FrameDecoder()
         self.queue: deque[Segment] = deque()
+        self.frames: deque[tuple[int, int]] = deque()  # segments left and bytes taken
+        self.used_bytes = 0
+        self.heads: list[tuple[int, int, int]] = []
+        self.configs: list[Config] = []
+        self.holds = 0
+        self.held_s = 0.0
+        self.override_percent = 100
         self.last_queued = False
         self.executed = 0
         self.position = [0, 0]
@@ -130,6 +145,9 @@ class Device:
 
     def take_byte(self, byte: int) -> None:
         if self.events.now_s < self.deaf_until_s:
+            return
+        if byte == HOLD_CODE:
+            self.hold()
             return
         if len(self.ring) >= RX_RING_BYTES:
             self.ring_full = (self.ring_full + 1) % 256
@@ -181,8 +199,21 @@ class Device:
             case Clear() if self.state is not State.RUNNING:
                 self._drop_queue(State.IDLE)
                 self.fault, self.refusal = Fault.NONE, Result.OK
-            case Segments() if self.state in (State.READY, State.RUNNING):
-                return self._append(message.segments)
+            case Segments() if self.state in (State.READY, State.RUNNING, State.HELD):
+                return self._append(message)
+            case Config() if self.state is State.IDLE:
+                self.configs.append(message)
+            case Resume():
+                if self.state is State.HELD:
+                    self.state = State.RUNNING
+                    self.segment_start_s += self.events.now_s - self.held_s
+                    self._await_segment_end()
+            case Stop():
+                if self.state is State.HELD:
+                    self.position = list(self._ledger().position_usteps)
+                    self._drop_queue(State.READY)
+            case Override():
+                self.override_percent = message.percent
             case Start() if self.state is State.READY and self.queue:
                 self.state = State.RUNNING
                 self.segment_start_s = self.events.now_s + message.lead_ticks / TICKS_HZ
@@ -191,18 +222,25 @@ class Device:
                 return Result.WRONG_STATE
         return Result.OK
 
-    def _append(self, segments: tuple[Segment, ...]) -> Result:
+    def _append(self, message: Segments) -> Result:
+        segments = message.segments
         if self.last_queued:
             self.latch(Fault.QUEUE_MISUSE)
             return Result.OK
-        if len(self.queue) + len(segments) > QUEUE_SLOTS:
+        room = encoded_bytes(message) + QUEUE_FRAME_BYTES
+        if room > QUEUE_BYTES - self.used_bytes:
             return Result.BUSY
+        self.heads.append((message.slow, message.fast, message.need))
+        self.frames.append((len(segments), room))
+        self.used_bytes += room
         self.queue.extend(segments)
         self.last_queued = is_last(segments[-1])
         return Result.OK
 
     def _drop_queue(self, state: State) -> None:
         self.queue.clear()
+        self.frames.clear()
+        self.used_bytes = 0
         self.last_queued = False
         self.state = state
 
@@ -212,13 +250,19 @@ class Device:
         return self.segment_start_s + duration_ticks(self.queue[0]) / TICKS_HZ
 
     def _await_segment_end(self) -> None:
-        self._later(self._segment_end_s() - self.events.now_s, self._end_segment)
+        end_s = self._segment_end_s()
+        self._later(end_s - self.events.now_s, lambda: self._end_segment(end_s))
 
-    def _end_segment(self) -> None:
-        if self.state is not State.RUNNING:
-            return
+    def _end_segment(self, end_s: float) -> None:
+        if self.state is not State.RUNNING or end_s != self._segment_end_s():
+            return  # a hold has put the end off
         self.segment_start_s = self._segment_end_s()
         segment = self.queue.popleft()
+        left, room = self.frames.popleft()
+        if left > 1:
+            self.frames.appendleft((left - 1, room))
+        else:
+            self.used_bytes -= room
         self.segments_executed.append(segment)
         self.executed += 1
         for joint, move in enumerate(segment.moves):
@@ -233,6 +277,15 @@ class Device:
         else:
             self.latch(Fault.UNDERRUN)
 
+    def hold(self) -> None:
+        """Rest at once; the released firmware slows down first."""
+        self.holds += 1
+        if self.state is State.RUNNING:
+            self.state = State.HELD
+            self.held_s = self.events.now_s
+            self.status_due = True
+            self._reply()
+
     def latch(self, fault: Fault) -> None:
         """Stop and tell."""
         self.position = list(self._ledger().position_usteps)
@@ -244,8 +297,9 @@ class Device:
 
     def _ledger(self) -> Ledger:
         position = list(self.position)
-        if self.state is State.RUNNING and self.queue:
-            elapsed_ticks = (self.events.now_s - self.segment_start_s) * TICKS_HZ
+        if self.state in (State.RUNNING, State.HELD) and self.queue:
+            now_s = self.held_s if self.state is State.HELD else self.events.now_s
+            elapsed_ticks = (now_s - self.segment_start_s) * TICKS_HZ
             for joint, move in enumerate(self.queue[0].moves):
                 position[joint] += direction(move) * sum(tick <= elapsed_ticks for tick in step_ticks(move))
         return Ledger(self.executed, tuple(position))
@@ -254,12 +308,17 @@ class Device:
         return Status(
             state=self.state,
             fault=self.fault,
+            detail=0,
             refusal=self.refusal,
             refusal_seq=self.refusal_seq,
-            free_slots=QUEUE_SLOTS - len(self.queue),
+            free_bytes=max(0, QUEUE_BYTES - self.used_bytes - QUEUE_FRAME_BYTES),
             crc_errors=self.crc_errors,
             overruns=0,
             ring_full=self.ring_full,
+            holds=self.holds,
+            inputs=0,
+            override_percent=self.override_percent,
+            rate_percent=0 if self.state is State.HELD else self.override_percent,
             mcu_ticks=int((self.events.now_s - self.boot_s) * TICKS_HZ) % 2**32,
             ledger=self._ledger(),
         )
@@ -271,7 +330,15 @@ class Device:
         message: Welcome | Status
         if self.welcome_due is not None:
             message = Welcome(
-                self.protocol_version, self.welcome_due, self.boot_nonce, self.spec_hash, (1, 2, 3), self._ledger()
+                self.protocol_version,
+                self.welcome_due,
+                self.boot_nonce,
+                self.spec_hash,
+                (1, 2, 3),
+                Reset.EXTERNAL,
+                0,
+                JOINTS,
+                self._ledger(),
             )
             self.welcome_due = None
         elif self.status_due:

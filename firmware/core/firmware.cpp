@@ -2,8 +2,14 @@
 
 #include "clock.h"
 #include "frame_receiver.h"
+#include "hal_journal.h"
+#include "hal_pins.h"
 #include "hal_serial.h"
+#include "hal_signals.h"
+#include "home.h"
+#include "inputs.h"
 #include "motion.h"
+#include "power.h"
 #include "reply.h"
 #include "session.h"
 #include "supervisor.h"
@@ -18,6 +24,7 @@ constexpr uint8_t BYTES_A_PASS = 8;
 
 FrameReceiver receiver;
 uint8_t reply_bytes[reply::MAX_ENCODED];
+uint8_t seen_holds;
 
 // Spreads counts that follow each other over all 32 bits; every step can be undone, so different counts stay
 // different. The multiplier is 2^32 over the golden ratio, made odd.
@@ -28,21 +35,91 @@ uint32_t mix(uint32_t count) {
     return mixed ^ (mixed >> 13);
 }
 
+void tell(supervisor::Event event, uint32_t now_ticks) {
+    supervisor::apply(event, now_ticks);
+    session::announce();
+}
+
+void fail(wire::Fault fault, uint8_t detail, uint32_t now_ticks) {
+    supervisor::fail(fault, detail, now_ticks);
+    session::announce();
+}
+
+void serve_emergency(uint32_t now_ticks) {
+    if (supervisor::state() == wire::State::FAULT) return;
+    const bool open = power::has_option(power::STOP_INPUT) && (hal::inputs() & hal::STOP_INPUT_OPEN) != 0;
+    const hal::Emergency emergency = hal::emergency();
+    if (emergency == hal::Emergency::NONE && !open) return;
+    fail(emergency == hal::Emergency::LINE ? wire::Fault::EMERGENCY_STOP : wire::Fault::STOP_INPUT, 0,
+         now_ticks);
+    if (power::has_option(power::EMERGENCY_RELEASES)) power::release();
+}
+
+// A step was missed, or the interrupts were switched off by an emergency a moment ago.
+void missed(uint8_t joint, uint32_t now_ticks) {
+    if (hal::emergency() != hal::Emergency::NONE) return serve_emergency(now_ticks);
+    fail(wire::Fault::MISSED_DEADLINE, joint, now_ticks);
+}
+
 void serve_motion(uint32_t now_ticks) {
+    using supervisor::Event;
     switch (motion::serve(now_ticks)) {
         case motion::Progress::GOING:
             return;
         case motion::Progress::DONE:
-            supervisor::motion_done();
-            break;
+            return tell(Event::DONE, now_ticks);
+        case motion::Progress::AT_REST:
+            return tell(Event::AT_REST, now_ticks);
+        case motion::Progress::STARVED:
+            return tell(Event::STARVED, now_ticks);
+        case motion::Progress::FED:
+            return tell(Event::FED, now_ticks);
         case motion::Progress::MISSED:
-            supervisor::fail(wire::Fault::MISSED_DEADLINE, now_ticks);
-            break;
+            return missed(0, now_ticks);
         case motion::Progress::UNDERRUN:
-            supervisor::fail(wire::Fault::UNDERRUN, now_ticks);
-            break;
+            return fail(wire::Fault::UNDERRUN, 0, now_ticks);
     }
-    session::announce();
+}
+
+void serve_homing(uint32_t now_ticks) {
+    switch (home::serve(now_ticks)) {
+        case home::Progress::NONE:
+        case home::Progress::GOING:
+            return;
+        case home::Progress::DONE:
+            return tell(supervisor::Event::DONE, now_ticks);
+        case home::Progress::FAILED:
+            return fail(wire::Fault::HOMING_FAILED, home::joint(), now_ticks);
+        case home::Progress::MISSED:
+            return missed(home::joint(), now_ticks);
+    }
+}
+
+// Limit switches in motion; while homing they are what is looked for.
+void serve_limits(uint32_t now_ticks) {
+    inputs::serve(now_ticks);
+    switch (supervisor::state()) {
+        case wire::State::RUNNING:
+        case wire::State::HOLDING:
+        case wire::State::STOPPING:
+            if (inputs::hit_joint() != wire::JOINTS)
+                fail(wire::Fault::LIMIT_SWITCH, inputs::hit_joint(), now_ticks);
+            return;
+        default:
+            return;
+    }
+}
+
+void serve_signals(uint32_t now_ticks) {
+    const uint8_t holds = hal::hold_count();
+    if (holds != seen_holds) {
+        seen_holds = holds;
+        tell(supervisor::Event::HOLD, now_ticks);
+    }
+    serve_limits(now_ticks);
+    if (supervisor::state() == wire::State::READY && power::is_idle_too_long(now_ticks)) {
+        tell(supervisor::Event::RELEASE, now_ticks);
+    }
 }
 
 void receive(uint32_t now_ticks) {
@@ -64,18 +141,28 @@ bool reply() {
 
 }  // namespace
 
-void set_up(uint32_t boot_count, uint32_t now_ticks) {
+void set_up(const Boot& boot, uint32_t now_ticks) {
     receiver = FrameReceiver();
     clock::reset(now_ticks);
     motion::reset();
+    home::reset();
+    power::reset(now_ticks);
+    inputs::reset(now_ticks);
     supervisor::reset();
     session::reset();
-    reply::set_boot_nonce(mix(boot_count));
+    seen_holds = hal::hold_count();
+    reply::set_boot({mix(boot.count), boot.cause, boot.was_enabled});
 }
 
 void pass() {
+    hal::watchdog_feed();
     const uint32_t now_ticks = clock::now();
+    serve_emergency(now_ticks);  // before the motion wonders where its interrupts are
     serve_motion(now_ticks);
+    if (motion::is_urgent()) return;
+    serve_homing(now_ticks);
+    serve_signals(now_ticks);
+    hal::journal_serve();
     if (reply()) return;
     if (session::is_busy()) {
         session::advance(now_ticks);

@@ -3,12 +3,20 @@
 
 #include <stdint.h>
 
+#include "messages.h"
+
 namespace planarm {
 namespace firmware {
 
-// `boot_count` differs at every boot; the low 16 bits of `now_ticks` are the timer's, read less than 65,536
-// ticks ago. Interrupts are still off.
-void set_up(uint32_t boot_count, uint32_t now_ticks);
+// What the board knows of its last start.
+struct Boot {
+    uint32_t count;  // differs at every boot
+    wire::Reset cause;
+    bool was_enabled;  // the drivers, when the reset came
+};
+
+// The low 16 bits of `now_ticks` are the timer's, read less than 65,536 ticks ago. Interrupts are still off.
+void set_up(const Boot& boot, uint32_t now_ticks);
 
 // One bounded pass: motion first, then one piece of work: a reply, a segment, or a few received bytes.
 void pass();

@@ -12,6 +12,8 @@ constexpr bool is_reserved(uint8_t byte) { return byte == wire::RESERVED[0] || b
 
 // Must be escaped inside a frame. The four codes are neighbours, which makes one comparison enough.
 constexpr uint8_t FIRST_SPECIAL = wire::RESERVED[0];
+static_assert(wire::HOLD_CODE == FIRST_SPECIAL && wire::EMERGENCY_CODE == FIRST_SPECIAL + 1,
+              "the receive interrupt looks at one range");
 static_assert(wire::RESERVED[1] == FIRST_SPECIAL + 1 && wire::ESCAPE == FIRST_SPECIAL + 2 &&
                   wire::DELIMITER == FIRST_SPECIAL + 3,
               "is_special looks at one range");

@@ -9,9 +9,9 @@ namespace planarm {
 namespace wire {
 
 // Both ends must have the same.
-constexpr uint8_t PROTOCOL_VERSION = 1;
+constexpr uint8_t PROTOCOL_VERSION = 2;
 // Of the specification without its wording.
-constexpr uint32_t SPEC_HASH = 0xD92A41ECUL;
+constexpr uint32_t SPEC_HASH = 0x6578D960UL;
 
 // Ends every frame.
 constexpr uint8_t DELIMITER = 0x7E;
@@ -21,6 +21,15 @@ constexpr uint8_t ESCAPE = 0x7D;
 constexpr uint8_t ESCAPE_XOR = 0x20;
 // Never inside a frame; receivers drop them.
 constexpr uint8_t RESERVED[2] = {0x7B, 0x7C};
+// Out of band: slows down along the path and rests there; RESUME goes on.
+constexpr uint8_t HOLD_CODE = 0x7B;
+// In a row.
+constexpr uint8_t HOLD_REPEATS = 1;
+// Out of band: ends all pulses at once. The position is lost. A real emergency stop cuts the
+// motors' supply.
+constexpr uint8_t EMERGENCY_CODE = 0x7C;
+// In a row.
+constexpr uint8_t EMERGENCY_REPEATS = 3;
 // CRC-16/MCRF4XX (reflected 0x1021, initial 0xFFFF, no final xor); sent low byte first.
 constexpr uint16_t CRC_INITIAL = 0xFFFFU;
 // Length, seq and type.
@@ -42,22 +51,43 @@ constexpr uint32_t BAUD = 250000UL;
 constexpr uint8_t RX_RING_BYTES = 128;
 // Most unacknowledged bytes, as encoded, the host may have in flight.
 constexpr uint8_t HOST_WINDOW_BYTES = 112;
-// Segments the firmware holds.
-constexpr uint8_t QUEUE_SLOTS = 32;
+// Bytes of queued segments that the firmware holds: a SEGMENTS frame takes its payload and
+// queue_frame_bytes.
+constexpr uint16_t QUEUE_BYTES = 896U;
+// Bytes that each queued SEGMENTS frame takes besides its payload.
+constexpr uint8_t QUEUE_FRAME_BYTES = 1;
 // Least time between two steps of one joint; min_dir_setup_ticks more where it turns round.
-constexpr uint16_t MIN_INTERVAL_TICKS = 320U;
+constexpr uint8_t MIN_INTERVAL_TICKS = 230;
+// Unit of a segment's need, 2.048 ms.
+constexpr uint16_t NEED_UNIT_TICKS = 32768U;
+// Most by which the device stretches the path clock.
+constexpr uint16_t MAX_STRETCH = 4096U;
+// Share of slow and fast that hold, stop, resume and override use; quick stop and a starving queue
+// use all of slow.
+constexpr uint8_t GENTLE_PERCENT = 50;
+// Interval of the start-stop speed until CONFIG tells it, 100 steps/s.
+constexpr uint32_t DEFAULT_START_STOP_TICKS = 160000UL;
+// Least time from ENABLE to the first step until CONFIG tells it, 10 ms.
+constexpr uint32_t DEFAULT_WAKE_TICKS = 160000UL;
+// The watchdog resets the chip when the main program stands still for so long.
+constexpr uint8_t WATCHDOG_MS = 250;
+// A limit switch counts when it stays so for this long, 5 ms.
+constexpr uint32_t DEBOUNCE_TICKS = 80000UL;
 // Largest interval inside a run of more than one step; longer gaps need a segment of their own.
 constexpr uint16_t MAX_INTERVAL_TICKS = 60000U;
+// Longest segment in which a joint may be faster than its start-stop speed, 4.1 ms. The device
+// changes the path clock's rate from segment to segment.
+constexpr uint32_t CALM_SEGMENT_TICKS = 65536UL;
 // Longest segment, about 67 s.
 constexpr uint32_t MAX_SEGMENT_TICKS = 1073741823UL;
 // Most steps of one joint in one segment.
 constexpr uint16_t MAX_SEGMENT_STEPS = 32767U;
 // Least lead of START, 1 ms.
 constexpr uint16_t MIN_LEAD_TICKS = 16000U;
-// Least high time of a step pulse, 2 us.
-constexpr uint8_t MIN_STEP_HIGH_TICKS = 32;
-// Least low time of a step pulse, 2 us.
-constexpr uint8_t MIN_STEP_LOW_TICKS = 32;
+// Least high time of a step pulse, 3.5 us.
+constexpr uint8_t MIN_STEP_HIGH_TICKS = 56;
+// Least low time of a step pulse, 2.5 us.
+constexpr uint8_t MIN_STEP_LOW_TICKS = 40;
 // Least time from a DIR edge to the next rising STEP edge, 20 us.
 constexpr uint16_t MIN_DIR_SETUP_TICKS = 320U;
 
@@ -78,13 +108,39 @@ enum class MessageType : uint8_t {
     // From the host: Energises (1) or releases (0) the drivers: idle to ready, ready to idle.
     // Releasing drops queued segments.
     ENABLE = 3,
-    // From the host: Appends segments, all or none. A broken limit latches bad_segment.
+    // From the host: Appends segments, all or none. A broken limit latches bad_segment. The head
+    // holds for all segments of the message. A rate is a code c of the value v = c below 16, else
+    // (16 + c mod 16) 2^(c div 16 - 1), and means v 2^-32 a tick: the path clock's rate, 1 when not
+    // stretched, may change by that much in each tick.
     SEGMENTS = 4,
     // From the host: Begins the queued motion: the first segment starts lead_ticks from now.
     START = 5,
     // From the host: Clears a latched fault and the refusal, drops the queue and releases the
     // drivers: fault, ready or idle to idle. Position counters stay.
     CLEAR = 6,
+    // From the host: Goes on after a hold, also one that is still slowing down. In any other state
+    // it changes nothing.
+    RESUME = 7,
+    // From the host: Sets the rate of the path clock, for this motion and those after it. The rate
+    // changes within the segments' allowances.
+    OVERRIDE = 8,
+    // From the host: Slows down along the path, then drops the rest of the motion; the position is
+    // kept. Answered at once; the stop is over when STATUS tells ready.
+    STOP = 9,
+    // From the host: Tells the arm's wiring and drivers; only in state idle. Until it comes, and
+    // after every reset, the defaults of the limits hold, nothing is inverted, and no input is
+    // used.
+    CONFIG = 0xA,
+    // From the host: Tells where each joint may be, in terms of the ledger's position; segments
+    // that leave it latch soft_limit. Least above most: no limit, as after a reset.
+    SOFT_LIMITS = 0xB,
+    // From the host: Moves one joint to its limit switch and off it again, slowly the second time.
+    // Only in state ready, with limit switches watched. The order of the joints is the host's. Ends
+    // in ready with the joint's position set, or in homing_failed.
+    HOME = 0xC,
+    // From the host: Tells the position of an arm at rest: the ledger counts on from there. Only in
+    // idle and ready.
+    SET_POSITION = 0xD,
     // From the device: Answers HELLO.
     WELCOME = 0x81,
     // From the device: Answers every frame but HELLO, and every frame that failed its checks. Sent
@@ -98,10 +154,21 @@ enum class State : uint8_t {
     IDLE = 0,
     // Drivers enabled, at rest; segments may be queued.
     READY = 1,
-    // Executing segments; more may be queued.
+    // Executing segments, slowed down while the queue starves; more may be queued.
     RUNNING = 2,
-    // Pulses stopped, first fault latched, drivers keep holding; CLEAR leads to idle.
+    // Pulses stopped, first fault latched, drivers keep holding. An emergency stop may release
+    // them. CLEAR leads to idle.
     FAULT = 3,
+    // Slowing down along the path towards a hold.
+    HOLDING = 4,
+    // At rest on the path after a hold; RESUME goes on, STOP drops the rest.
+    HELD = 5,
+    // At rest on the path because the queue ran low; goes on by itself when it is filled.
+    STARVED = 6,
+    // Slowing down along the path; then the rest is dropped and the state is ready.
+    STOPPING = 7,
+    // Moving one joint to its limit switch.
+    HOMING = 8,
 };
 
 // Why the device stopped its pulses.
@@ -116,6 +183,39 @@ enum class Fault : uint8_t {
     BAD_SEGMENT = 3,
     // Segments arrived after the last segment of a motion.
     QUEUE_MISUSE = 4,
+    // An emergency stop came over the line; the position is lost.
+    EMERGENCY_STOP = 5,
+    // The stop input opened; the position is lost.
+    STOP_INPUT = 6,
+    // A limit switch closed during a motion; detail tells the joint.
+    LIMIT_SWITCH = 7,
+    // A segment would leave a joint's soft limits; detail tells the joint.
+    SOFT_LIMIT = 8,
+    // The limit switch was not found, or did not open again; detail tells the joint.
+    HOMING_FAILED = 9,
+};
+
+// Why the device last started.
+enum class Reset : uint8_t {
+    // The chip does not tell, and its memory was in use before: the reset line, or a short loss of
+    // power.
+    UNKNOWN = 0,
+    // Power came on.
+    POWER_ON = 1,
+    // The reset line, as when a port is opened.
+    EXTERNAL = 2,
+    // The supply fell below the brown-out level.
+    BROWN_OUT = 3,
+    // The main program stood still and the watchdog reset the chip.
+    WATCHDOG = 4,
+};
+
+// Where the drivers are wired.
+enum class PinMap : uint8_t {
+    // Own wiring: STEP on the compare outputs D9 and D10.
+    OWN = 0,
+    // The Arduino CNC shield: STEP on D2 and D3 by interrupt, at a lower rate.
+    CNC_SHIELD = 1,
 };
 
 // How a command went: 0 done, above 0 send it again, below 0 refused.
@@ -152,8 +252,8 @@ namespace enable_at {
 constexpr uint8_t ON = 0;  // u8
 }  // namespace enable_at
 
-// Segments: payload of 3 to 48 bytes.
-constexpr uint8_t SEGMENTS_MIN_BYTES = 3;
+// Segments: payload of 6 to 48 bytes.
+constexpr uint8_t SEGMENTS_MIN_BYTES = 6;
 
 // Start: payload of 4 bytes.
 constexpr uint8_t START_BYTES = 4;
@@ -164,32 +264,93 @@ constexpr uint8_t LEAD_TICKS = 0;  // u32, ticks
 // Clear: payload of 0 bytes.
 constexpr uint8_t CLEAR_BYTES = 0;
 
-// Welcome: payload of 28 bytes.
-constexpr uint8_t WELCOME_BYTES = 28;
+// Resume: payload of 0 bytes.
+constexpr uint8_t RESUME_BYTES = 0;
+
+// Override: payload of 1 byte.
+constexpr uint8_t OVERRIDE_BYTES = 1;
+namespace override_at {
+constexpr uint8_t PERCENT = 0;  // u8, %
+}  // namespace override_at
+
+// Stop: payload of 1 byte.
+constexpr uint8_t STOP_BYTES = 1;
+namespace stop_at {
+constexpr uint8_t QUICK = 0;  // u8
+}  // namespace stop_at
+
+// Config: payload of 22 bytes.
+constexpr uint8_t CONFIG_BYTES = 22;
+namespace config_at {
+constexpr uint8_t PIN_MAP = 0;            // u8
+constexpr uint8_t JOINTS = 1;             // u8
+constexpr uint8_t DIR_INVERTED = 2;       // u8
+constexpr uint8_t OPTIONS = 3;            // u8
+constexpr uint8_t IDLE_MS = 4;            // u32, ms
+constexpr uint8_t WAKE_TICKS = 8;         // u32, ticks
+constexpr uint8_t HIGH_TICKS = 12;        // u16, ticks
+constexpr uint8_t START_STOP_TICKS = 14;  // u32 x 2, ticks
+}  // namespace config_at
+
+// SoftLimits: payload of 16 bytes.
+constexpr uint8_t SOFT_LIMITS_BYTES = 16;
+namespace soft_limits_at {
+constexpr uint8_t LEAST_USTEPS = 0;  // i32 x 2, usteps
+constexpr uint8_t MOST_USTEPS = 8;   // i32 x 2, usteps
+}  // namespace soft_limits_at
+
+// Home: payload of 22 bytes.
+constexpr uint8_t HOME_BYTES = 22;
+namespace home_at {
+constexpr uint8_t JOINT = 0;             // u8
+constexpr uint8_t POSITIVE = 1;          // u8
+constexpr uint8_t FAST_TICKS = 2;        // u32, ticks
+constexpr uint8_t SLOW_TICKS = 6;        // u32, ticks
+constexpr uint8_t MOST_USTEPS = 10;      // u32, usteps
+constexpr uint8_t BACK_USTEPS = 14;      // u32, usteps
+constexpr uint8_t POSITION_USTEPS = 18;  // i32, usteps
+}  // namespace home_at
+
+// SetPosition: payload of 8 bytes.
+constexpr uint8_t SET_POSITION_BYTES = 8;
+namespace set_position_at {
+constexpr uint8_t POSITION_USTEPS = 0;  // i32 x 2, usteps
+}  // namespace set_position_at
+
+// Welcome: payload of 31 bytes.
+constexpr uint8_t WELCOME_BYTES = 31;
 namespace welcome_at {
 constexpr uint8_t PROTOCOL_VERSION = 0;           // u8
 constexpr uint8_t HOST_NONCE = 1;                 // u32
 constexpr uint8_t BOOT_NONCE = 5;                 // u32
 constexpr uint8_t SPEC_HASH = 9;                  // u32
 constexpr uint8_t FIRMWARE_VERSION = 13;          // u8 x 3
-constexpr uint8_t LEDGER_EXECUTED_SEGMENTS = 16;  // u32
-constexpr uint8_t LEDGER_POSITION_USTEPS = 20;    // i32 x 2, usteps
+constexpr uint8_t RESET_CAUSE = 16;               // u8
+constexpr uint8_t INTERRUPTED = 17;               // u8
+constexpr uint8_t JOINTS = 18;                    // u8
+constexpr uint8_t LEDGER_EXECUTED_SEGMENTS = 19;  // u32
+constexpr uint8_t LEDGER_POSITION_USTEPS = 23;    // i32 x 2, usteps
 }  // namespace welcome_at
 
-// Status: payload of 24 bytes.
-constexpr uint8_t STATUS_BYTES = 24;
+// Status: payload of 30 bytes.
+constexpr uint8_t STATUS_BYTES = 30;
 namespace status_at {
 constexpr uint8_t STATE = 0;                      // u8
 constexpr uint8_t FAULT = 1;                      // u8
-constexpr uint8_t REFUSAL = 2;                    // i8
-constexpr uint8_t REFUSAL_SEQ = 3;                // u8
-constexpr uint8_t FREE_SLOTS = 4;                 // u8, segments
-constexpr uint8_t CRC_ERRORS = 5;                 // u8
-constexpr uint8_t OVERRUNS = 6;                   // u8
-constexpr uint8_t RING_FULL = 7;                  // u8
-constexpr uint8_t MCU_TICKS = 8;                  // u32, ticks
-constexpr uint8_t LEDGER_EXECUTED_SEGMENTS = 12;  // u32
-constexpr uint8_t LEDGER_POSITION_USTEPS = 16;    // i32 x 2, usteps
+constexpr uint8_t DETAIL = 2;                     // u8
+constexpr uint8_t REFUSAL = 3;                    // i8
+constexpr uint8_t REFUSAL_SEQ = 4;                // u8
+constexpr uint8_t FREE_BYTES = 5;                 // u16, bytes
+constexpr uint8_t CRC_ERRORS = 7;                 // u8
+constexpr uint8_t OVERRUNS = 8;                   // u8
+constexpr uint8_t RING_FULL = 9;                  // u8
+constexpr uint8_t HOLDS = 10;                     // u8
+constexpr uint8_t INPUTS = 11;                    // u8
+constexpr uint8_t OVERRIDE_PERCENT = 12;          // u8, %
+constexpr uint8_t RATE_PERCENT = 13;              // u8, %
+constexpr uint8_t MCU_TICKS = 14;                 // u32, ticks
+constexpr uint8_t LEDGER_EXECUTED_SEGMENTS = 18;  // u32
+constexpr uint8_t LEDGER_POSITION_USTEPS = 22;    // i32 x 2, usteps
 }  // namespace status_at
 
 static_assert(MAX_FRAME_BYTES <= HOST_WINDOW_BYTES, "the longest frame fits the host's window");

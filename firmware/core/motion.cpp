@@ -1,140 +1,367 @@
 #include "motion.h"
 
 #include "clock.h"
+#include "cursor.h"
+#include "path_clock.h"
+#include "queue.h"
+#include "segment.h"
 #include "step_engine.h"
 
 namespace planarm {
 namespace motion {
 
+using path_clock::ONE;
+using path_clock::Slice;
+
+Joint joints[wire::JOINTS];
+
 namespace {
 
-// A segment is prepared this long before its start at the earliest, so that the end of what is prepared stays
-// near enough for its time to compare rightly.
-constexpr int32_t PREPARE_AHEAD_TICKS = 0x100000;
+// A slice is prepared this long before its start: 3 ms, in which the main program comes round at least
+// twice with both joints at the least interval. No earlier, so that a hold takes effect soon.
+constexpr int32_t PREPARE_AHEAD_TICKS = 48000;
 
-// The first segment to be prepared must have come this long before its start: 1.25 ms, in which a pass of the
-// main program ends at the latest, with both joints at the least interval, and the joint gets its DIR.
+// Segments must have come this long before they start: 1.25 ms.
 constexpr int32_t LATEST_ARRIVAL_TICKS = 20000;
 
-static_assert((wire::QUEUE_SLOTS & (wire::QUEUE_SLOTS - 1)) == 0, "slot indices wrap by a mask");
+// After a rest on the path the joints start this long after they are told to: their DIR pins are set by then.
+constexpr uint32_t THAW_LEAD_TICKS = 16000;
 
-Segment slots[wire::QUEUE_SLOTS];
-uint8_t oldest;    // index of the oldest queued segment
-uint8_t queued;    // segments committed and not yet executed
-uint8_t prepared;  // of these, handed to the step engine
-uint8_t staged;    // segments behind the queued ones, not yet committed
+// What the queue must hold beyond the need to rest. A payload that still fits means that more can come.
+constexpr uint32_t STARVING_MARGIN_TICKS = 65536;
+constexpr uint16_t FULL_BYTES = wire::MAX_PAYLOAD_BYTES;
 
-Rest queue_rest;   // at the end of the queue
-Rest staged_rest;  // at the end of the staged segments
+constexpr uint8_t MAX_SLICES = 4;
+
+// -- what is queued --
+
+uint32_t queued_path_ticks;  // of all segments not yet begun, saturated
+bool complete;               // the motion's last segment is among those
+Rest queue_rest;             // at the end of the queue
+int32_t queue_usteps[wire::JOINTS];
+
+struct Check {
+    Reader reader;
+    uint32_t path_ticks;
+    Rest rest;
+    int32_t usteps[wire::JOINTS];
+    bool complete;
+    uint8_t joint_out;
+};
+
+Check checked;
+
+// -- what is being worked off --
 
 bool running;
-uint32_t oldest_end_ticks;     // end of the oldest prepared segment
-uint32_t prepare_start_ticks;  // start of the next segment to be prepared
+uint32_t begin_ticks;  // start of the motion
+Wish wish;
+uint8_t percent;
+uint32_t override_stretch;
+
+Reader payload;  // the oldest, being read
+bool reading;
+uint32_t slow_value;
+uint32_t fast_value;
+uint32_t need_ticks;
+
+bool in_segment;
+uint32_t segment_ticks;
+bool segment_last;
+uint32_t path_at;  // in the segment, where the next slice begins
+
+Cursor cursors[wire::JOINTS];
+Slice slice;  // being filled, or the last one filled
+bool filling;
+bool urgent;  // the last call of serve handed something over
+
+uint32_t stretch;        // at the end of the last slice
+uint32_t prepare_ticks;  // start of the next slice
+
+// Slices handed over and not yet executed, oldest first.
+struct Prepared {
+    uint32_t end_ticks;
+    bool ends_segment;
+    bool ends_motion;
+    bool calm;
+};
+
+Prepared prepared[MAX_SLICES];
+uint8_t prepared_count;
 uint32_t executed_segments;
 
-Segment& slot(uint8_t position) { return slots[(oldest + position) & (wire::QUEUE_SLOTS - 1)]; }
+bool frozen;
+bool starved;  // frozen because the queue ran low
+uint32_t frozen_ticks;
 
 bool has_come(uint32_t ticks, uint32_t now_ticks) { return static_cast<int32_t>(now_ticks - ticks) >= 0; }
 
-void prepare_next(uint32_t now_ticks) {
-    if (prepared == queued) return;
-    if (static_cast<int32_t>(prepare_start_ticks - now_ticks) > PREPARE_AHEAD_TICKS) return;
-    const Segment& segment = slot(prepared);
-    for (uint8_t joint = 0; joint < wire::JOINTS; ++joint) {
-        if (segment.moves[joint].steps != 0 && !step_engine::has_room(joint)) return;
-    }
-    for (uint8_t joint = 0; joint < wire::JOINTS; ++joint) {
-        const Move& move = segment.moves[joint];
-        if (move.steps != 0) step_engine::append(joint, move, prepare_start_ticks);
-    }
-    prepare_start_ticks += segment.duration_ticks;
-    if (prepared == 0) oldest_end_ticks = prepare_start_ticks;
-    ++prepared;
+// True when the path that is left after `path_ticks` of the segment is too short to rest on.
+bool is_starving(uint32_t path_ticks, uint32_t margin_ticks) {
+    if (complete || segment_last || queue::free_bytes() < FULL_BYTES) return false;
+    const uint32_t rest_of_segment = in_segment ? segment_ticks - path_ticks : 0;
+    return add_saturated(queued_path_ticks, rest_of_segment) < need_ticks + margin_ticks;
 }
 
-// Takes executed segments off the queue. True when the last of them ended the motion's data, as far as
-// received.
-bool retire(uint32_t now_ticks) {
-    while (prepared != 0 && has_come(oldest_end_ticks, now_ticks)) {
-        oldest = static_cast<uint8_t>((oldest + 1) & (wire::QUEUE_SLOTS - 1));
-        --queued;
-        --prepared;
-        ++executed_segments;
-        if (queued == 0) return true;
-        oldest_end_ticks += slot(0).duration_ticks;
+bool read_next_segment() {
+    if (!reading) {
+        if (queue::is_empty()) return false;
+        payload = queue::front();
+        slow_value = path_clock::rate_value(payload.u8());
+        fast_value = path_clock::rate_value(payload.u8());
+        need_ticks = static_cast<uint32_t>(payload.u8()) * wire::NEED_UNIT_TICKS;
+        reading = true;
+    }
+    Segment segment;
+    read_segment(payload, segment);
+    if (payload.at_end()) {
+        queue::release();
+        reading = false;
+    }
+    segment_ticks = segment.duration_ticks;
+    segment_last = segment.last;
+    if (queued_path_ticks != 0xFFFFFFFF) queued_path_ticks -= segment_ticks;
+    if (queue::is_empty()) queued_path_ticks = 0;
+    for (uint8_t joint = 0; joint < wire::JOINTS; ++joint) cursors[joint].begin(segment.moves[joint]);
+    path_at = 0;
+    in_segment = true;
+    return true;
+}
+
+// The stretch at the end of the next slice.
+uint32_t next_stretch(uint32_t path_ticks) {
+    using path_clock::MAX_STRETCH;
+    const bool starving = is_starving(path_at + path_ticks, STARVING_MARGIN_TICKS);
+    if (wish == Wish::REST_QUICKLY || starving) {
+        return path_clock::slowed({stretch, MAX_STRETCH, slow_value, path_ticks});
+    }
+    const uint32_t target = wish == Wish::REST ? MAX_STRETCH : override_stretch;
+    if (target > stretch) return path_clock::slowed({stretch, target, slow_value >> 1, path_ticks});
+    if (target < stretch) return path_clock::sped_up({stretch, target, fast_value >> 1, path_ticks});
+    return stretch;
+}
+
+bool is_calm() {
+    for (uint8_t joint = 0; joint < wire::JOINTS; ++joint) {
+        if (!cursors[joint].is_calm(slice, joints[joint].start_stop_ticks)) return false;
+    }
+    return true;
+}
+
+void open_slice() {
+    uint32_t path_ticks = segment_ticks - path_at;
+    if (path_ticks > path_clock::MAX_SLICE_TICKS) path_ticks = path_clock::MAX_SLICE_TICKS;
+    const uint32_t end_stretch = next_stretch(path_ticks);
+    slice = Slice(
+        {path_at, path_ticks, prepare_ticks, stretch, end_stretch, path_at + path_ticks == segment_ticks});
+    stretch = end_stretch;
+    path_at += path_ticks;
+    prepare_ticks += slice.ticks();
+    const bool ends_segment = path_at == segment_ticks;
+    prepared[prepared_count++] = {prepare_ticks, ends_segment, ends_segment && segment_last, is_calm()};
+    filling = true;
+}
+
+// Hands one run over. True when nothing of the slice is left.
+bool fill_slice() {
+    bool more = false;
+    for (uint8_t joint = 0; joint < wire::JOINTS; ++joint) {
+        Cursor& cursor = cursors[joint];
+        if (!cursor.has_step_before(path_at)) continue;
+        if (!urgent && step_engine::has_room(joint)) {
+            step_engine::append(joint, cursor.take(slice));
+            urgent = true;
+        }
+        more = more || cursor.has_step_before(path_at);
+    }
+    if (more) return false;
+    if (path_at == segment_ticks) {
+        for (Cursor& cursor : cursors) cursor.finish(segment_ticks);
+        in_segment = false;
+    }
+    return true;
+}
+
+void prepare(uint32_t now_ticks) {
+    urgent = false;
+    if (!filling) {
+        const int32_t away_ticks = static_cast<int32_t>(prepare_ticks - now_ticks);
+        if (prepared_count == MAX_SLICES || away_ticks > PREPARE_AHEAD_TICKS) return;
+        if (!in_segment && !read_next_segment()) return;
+        open_slice();
+        urgent = !slice.is_plain();  // else there is time for a run, too
+    }
+    filling = !fill_slice();
+}
+
+// Takes executed slices off the list. True when the last of them ended what was received.
+bool retire(uint32_t now_ticks, bool& ends_motion) {
+    while (prepared_count != 0 && has_come(prepared[0].end_ticks, now_ticks)) {
+        if (prepared[0].ends_segment) ++executed_segments;
+        ends_motion = prepared[0].ends_motion;
+        --prepared_count;
+        for (uint8_t i = 0; i < prepared_count; ++i) prepared[i] = prepared[i + 1];
+        if (prepared_count == 0 && !in_segment && queue::is_empty()) return true;
     }
     return false;
+}
+
+void clear() {
+    queue::clear();
+    queued_path_ticks = 0;
+    complete = false;
+    queue_rest = Rest();
+    running = reading = in_segment = segment_last = filling = frozen = starved = false;
+    wish = Wish::GO;
+    stretch = override_stretch;
+    prepared_count = 0;
+    for (Cursor& cursor : cursors) cursor.reset();
+    const step_engine::Position position = step_engine::position();
+    for (uint8_t joint = 0; joint < wire::JOINTS; ++joint) queue_usteps[joint] = position.usteps[joint];
+}
+
+void thaw(uint32_t now_ticks) {
+    const uint32_t stood_ticks = now_ticks + THAW_LEAD_TICKS - frozen_ticks;
+    step_engine::shift(stood_ticks);
+    for (uint8_t i = 0; i < prepared_count; ++i) prepared[i].end_ticks += stood_ticks;
+    for (Cursor& cursor : cursors) cursor.shift(stood_ticks);
+    if (!has_come(begin_ticks, frozen_ticks)) begin_ticks += stood_ticks;
+    prepare_ticks += stood_ticks;
+    slice.shift(stood_ticks);
+    frozen = starved = false;
+}
+
+// True when the slice that is being executed lets the joints stop dead, or none is yet.
+bool may_freeze(uint32_t now_ticks) {
+    if (!has_come(begin_ticks, now_ticks)) return true;
+    return prepared_count != 0 && prepared[0].calm;
+}
+
+Progress serve_frozen(uint32_t now_ticks) {
+    if (wish != Wish::GO) {
+        if (!starved) return Progress::GOING;
+        starved = false;
+        return Progress::AT_REST;
+    }
+    if (starved && is_starving(path_at, 2 * STARVING_MARGIN_TICKS)) return Progress::GOING;
+    const bool was_starved = starved;
+    thaw(now_ticks);
+    return was_starved ? Progress::FED : Progress::GOING;
+}
+
+Progress freeze_if_due(uint32_t now_ticks) {
+    const bool starving = wish == Wish::GO && is_starving(path_at, STARVING_MARGIN_TICKS);
+    if (wish == Wish::GO && !starving) return Progress::GOING;
+    if (!may_freeze(now_ticks) || !step_engine::freeze(frozen_ticks)) return Progress::GOING;
+    frozen = true;
+    starved = starving;
+    return starving ? Progress::STARVED : Progress::AT_REST;
 }
 
 }  // namespace
 
 void reset() {
     step_engine::reset();
-    oldest = queued = prepared = staged = 0;
-    queue_rest = staged_rest = Rest();
-    running = false;
+    for (Joint& joint : joints) joint = {wire::DEFAULT_START_STOP_TICKS, 0, -1};
+    set_override(100);
     executed_segments = 0;
+    clear();
 }
 
-bool is_complete() {
-    const uint8_t filled = static_cast<uint8_t>(queued + staged);
-    return filled != 0 && slot(static_cast<uint8_t>(filled - 1)).last;
+bool is_complete() { return complete; }
+
+wire::Result begin_check(const uint8_t* bytes, uint8_t length) {
+    if (length > queue::free_bytes()) return wire::Result::BUSY;
+    checked.reader = Reader(bytes, length);
+    for (uint8_t i = 0; i < 3; ++i) checked.reader.u8();
+    checked.path_ticks = 0;
+    checked.rest = queue_rest;
+    checked.complete = false;
+    checked.joint_out = wire::JOINTS;
+    for (uint8_t joint = 0; joint < wire::JOINTS; ++joint) checked.usteps[joint] = queue_usteps[joint];
+    return checked.reader.ok() && !checked.reader.at_end() ? wire::Result::OK : wire::Result::MALFORMED;
 }
 
-wire::Result stage(Reader& reader) {
-    const uint8_t filled = static_cast<uint8_t>(queued + staged);
-    if (filled == wire::QUEUE_SLOTS) return wire::Result::BUSY;
-    Segment& segment = slot(filled);
-    read_segment(reader, segment);
-    if (!reader.ok()) return wire::Result::MALFORMED;
-    const wire::Result result = check_segment(segment, staged_rest);
-    if (result == wire::Result::OK) ++staged;
+wire::Result check_next() {
+    if (checked.complete) return wire::Result::WRONG_STATE;
+    Segment segment;
+    read_segment(checked.reader, segment);
+    if (!checked.reader.ok()) return wire::Result::MALFORMED;
+    const wire::Result result = check_segment(segment, checked.rest);
+    if (result != wire::Result::OK) return result;
+    checked.path_ticks = add_saturated(checked.path_ticks, segment.duration_ticks);
+    checked.complete = segment.last;
+    for (uint8_t joint = 0; joint < wire::JOINTS; ++joint) {
+        const Move& move = segment.moves[joint];
+        int32_t& usteps = checked.usteps[joint];
+        usteps += move.positive ? static_cast<int32_t>(move.steps) : -static_cast<int32_t>(move.steps);
+        const Joint& limits = joints[joint];
+        if (move.steps == 0 || limits.least_usteps > limits.most_usteps) continue;
+        if (usteps < limits.least_usteps || usteps > limits.most_usteps) checked.joint_out = joint;
+    }
     return result;
 }
 
-bool commit() {
-    const bool starving = running && prepared == queued;
-    if (starving && static_cast<int32_t>(prepare_start_ticks - clock::now()) < LATEST_ARRIVAL_TICKS) {
-        discard();
+bool is_checked() { return checked.reader.at_end(); }
+
+uint8_t joint_out_of_limits() { return checked.joint_out; }
+
+bool commit(const uint8_t* bytes, uint8_t length) {
+    const bool out_of_road = running && !frozen && !in_segment && queue::is_empty();
+    if (out_of_road && static_cast<int32_t>(prepare_ticks - clock::now()) < LATEST_ARRIVAL_TICKS)
         return false;
-    }
-    queued = static_cast<uint8_t>(queued + staged);
-    staged = 0;
-    queue_rest = staged_rest;
+    queue::append(bytes, length);
+    queued_path_ticks = add_saturated(queued_path_ticks, checked.path_ticks);
+    queue_rest = checked.rest;
+    complete = checked.complete;
+    for (uint8_t joint = 0; joint < wire::JOINTS; ++joint) queue_usteps[joint] = checked.usteps[joint];
     return true;
 }
 
-void discard() {
-    staged = 0;
-    staged_rest = queue_rest;
-}
+bool is_empty() { return queue::is_empty(); }
 
-bool is_empty() { return queued == 0; }
+bool is_urgent() { return running && !frozen && filling && urgent; }
 
-uint8_t free_slots() { return static_cast<uint8_t>(wire::QUEUE_SLOTS - queued); }
+uint16_t free_bytes() { return queue::free_bytes(); }
 
 void start(uint32_t start_ticks) {
-    prepare_start_ticks = start_ticks;
+    begin_ticks = prepare_ticks = start_ticks;
+    stretch = override_stretch;
     running = true;
+}
+
+void set_wish(Wish wished) { wish = wished; }
+
+void set_override(uint8_t to_percent) {
+    percent = to_percent;
+    override_stretch = (100 * ONE) / to_percent;
+}
+
+uint8_t override_percent() { return percent; }
+
+uint8_t rate_percent() {
+    if (frozen) return 0;
+    return static_cast<uint8_t>((100 * ONE) / stretch);
 }
 
 Progress serve(uint32_t now_ticks) {
     if (!running) return Progress::GOING;
+    if (frozen) return serve_frozen(now_ticks);
+    prepare(now_ticks);
     if (!step_engine::serve(now_ticks)) return Progress::MISSED;
-    prepare_next(now_ticks);
-    const bool was_last = slot(static_cast<uint8_t>(queued - 1)).last;
-    if (!retire(now_ticks)) return Progress::GOING;
-    running = false;
-    queue_rest = staged_rest = Rest();
-    return was_last ? Progress::DONE : Progress::UNDERRUN;
+    bool ends_motion = false;
+    if (retire(now_ticks, ends_motion)) {
+        clear();
+        return ends_motion ? Progress::DONE : Progress::UNDERRUN;
+    }
+    return freeze_if_due(now_ticks);
 }
 
 void halt(uint32_t now_ticks) {
-    if (running && !step_engine::missed()) retire(now_ticks);
+    bool ends_motion;
+    if (running && !frozen && !step_engine::missed()) retire(now_ticks, ends_motion);
     step_engine::stop();
-    oldest = queued = prepared = staged = 0;
-    queue_rest = staged_rest = Rest();
-    running = false;
+    clear();
 }
 
 Ledger ledger() {
@@ -142,16 +369,19 @@ Ledger ledger() {
     Ledger ledger;
     ledger.ticks = clock::extend(position.counter);
     ledger.executed_segments = executed_segments;
-    // After a missed step the clock no longer tells what was executed.
-    const uint8_t timely = step_engine::missed() ? 0 : prepared;
-    uint32_t end_ticks = oldest_end_ticks;
-    for (uint8_t i = 0; i < timely && has_come(end_ticks, ledger.ticks); ++i) {
-        ++ledger.executed_segments;
-        end_ticks += slot(static_cast<uint8_t>(i + 1)).duration_ticks;
+    // After a missed step, and while the path clock stands, time does not tell what was executed.
+    const uint8_t timely = step_engine::missed() || frozen ? 0 : prepared_count;
+    for (uint8_t i = 0; i < timely && has_come(prepared[i].end_ticks, ledger.ticks); ++i) {
+        if (prepared[i].ends_segment) ++ledger.executed_segments;
     }
     for (uint8_t joint = 0; joint < wire::JOINTS; ++joint)
         ledger.position_usteps[joint] = position.usteps[joint];
     return ledger;
+}
+
+void set_position(uint8_t joint, int32_t usteps) {
+    step_engine::set_position(joint, usteps);
+    queue_usteps[joint] = usteps;
 }
 
 }  // namespace motion

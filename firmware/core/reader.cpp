@@ -4,45 +4,60 @@ namespace planarm {
 
 namespace {
 
-constexpr uint8_t LONGEST_VARUINT = 5;
+constexpr uint8_t MORE = 0x80;  // the number goes on
 
-// value << 7 in byte moves and one shift, which an 8-bit machine does faster than seven.
-uint32_t shift_by_seven(uint32_t value) { return ((value >> 1) << 8) | ((value & 1) != 0 ? 0x80 : 0); }
+// Four bytes as a number; byte moves on an 8-bit machine.
+uint32_t join(uint8_t b0, uint8_t b1, uint8_t b2, uint8_t b3) {
+    const uint16_t low = static_cast<uint16_t>(b0 | (b1 << 8));
+    const uint16_t high = static_cast<uint16_t>(b2 | (b3 << 8));
+    return low | (static_cast<uint32_t>(high) << 16);
+}
+
+uint8_t bits(unsigned value) { return static_cast<uint8_t>(value); }
 
 }  // namespace
 
 // Leaves nothing to read, so that every later field fails as well.
 uint32_t Reader::fail() {
     ok_ = false;
-    at_ = end_;
+    left_ = 0;
     return 0;
 }
 
-uint8_t Reader::u8() { return at_ == end_ ? static_cast<uint8_t>(fail()) : *at_++; }
-
-uint32_t Reader::u32() {
-    if (end_ - at_ < 4) return fail();
-    uint32_t value = 0;
-    for (uint8_t i = 4; i-- > 0;) value = (value << 8) | at_[i];
-    at_ += 4;
-    return value;
+uint16_t Reader::u16() {
+    const uint8_t low = u8();
+    return static_cast<uint16_t>(low | (u8() << 8));
 }
 
-uint32_t Reader::varuint() {
-    const uint8_t* byte = at_;
-    uint8_t length = 0;
-    do {
-        if (byte == end_ || length == LONGEST_VARUINT) return fail();
-        ++length;
-    } while (*byte++ >= 0x80);
-    const uint8_t* const next = byte;
+uint32_t Reader::u32() {
+    if (left_ < 4) return fail();
+    const uint8_t b0 = next();
+    const uint8_t b1 = next();
+    const uint8_t b2 = next();
+    return join(b0, b1, b2, next());
+}
 
-    uint32_t value = *--byte;  // the most significant bits
-    if (length > 1 && value == 0) return fail();
-    if (length == LONGEST_VARUINT && value > 0x0F) return fail();
-    while (byte != at_) value = shift_by_seven(value) | (*--byte & 0x7F);
-    at_ = next;
-    return value;
+// Seven bits a byte, written out byte by byte because shifts of a number cost an 8-bit machine a loop.
+uint32_t Reader::varuint() {
+    if (left_ == 0) return fail();
+    const uint8_t b0 = next();
+    if (b0 < MORE) return b0;
+    if (left_ == 0) return fail();
+    const uint8_t b1 = next();
+    const uint8_t r0 = bits((b0 & 0x7F) | (b1 << 7));
+    if (b1 < MORE) return b1 == 0 ? fail() : join(r0, bits(b1 >> 1), 0, 0);
+    if (left_ == 0) return fail();
+    const uint8_t b2 = next();
+    const uint8_t r1 = bits(((b1 & 0x7F) >> 1) | (b2 << 6));
+    if (b2 < MORE) return b2 == 0 ? fail() : join(r0, r1, bits(b2 >> 2), 0);
+    if (left_ == 0) return fail();
+    const uint8_t b3 = next();
+    const uint8_t r2 = bits(((b2 & 0x7F) >> 2) | (b3 << 5));
+    if (b3 < MORE) return b3 == 0 ? fail() : join(r0, r1, r2, bits(b3 >> 3));
+    if (left_ == 0) return fail();
+    const uint8_t b4 = next();
+    if (b4 == 0 || b4 > 0x0F) return fail();
+    return join(r0, r1, r2, bits(((b3 & 0x7F) >> 3) | (b4 << 4)));
 }
 
 int32_t Reader::varint() {

@@ -3,6 +3,8 @@
 #include "framing.h"
 #include "hal_crc.h"
 #include "hal_serial.h"
+#include "hal_signals.h"
+#include "inputs.h"
 #include "motion.h"
 #include "supervisor.h"
 #include "version.h"
@@ -12,18 +14,21 @@ namespace reply {
 
 namespace {
 
-uint32_t boot_nonce;
+Boot last_boot;
 
 // Collects a payload's fields, little-endian.
 class Fields {
   public:
     void u8(uint8_t byte) { *at_++ = byte; }
 
-    void u32(uint32_t value) {
+    void u16(uint16_t value) {
         u8(static_cast<uint8_t>(value));
         u8(static_cast<uint8_t>(value >> 8));
-        u8(static_cast<uint8_t>(value >> 16));
-        u8(static_cast<uint8_t>(value >> 24));
+    }
+
+    void u32(uint32_t value) {
+        u16(static_cast<uint16_t>(value));
+        u16(static_cast<uint16_t>(value >> 16));
     }
 
     void ledger(const motion::Ledger& ledger) {
@@ -74,7 +79,7 @@ uint8_t encode(uint8_t* encoded, uint8_t seq, wire::MessageType type, const Fiel
 
 }  // namespace
 
-void set_boot_nonce(uint32_t nonce) { boot_nonce = nonce; }
+void set_boot(const Boot& boot) { last_boot = boot; }
 
 uint8_t welcome(uint8_t* encoded, const session::Report& report, uint32_t host_nonce) {
     static_assert(wire::WELCOME_BYTES == MAX_PAYLOAD && wire::WELCOME_BYTES >= wire::STATUS_BYTES,
@@ -82,11 +87,14 @@ uint8_t welcome(uint8_t* encoded, const session::Report& report, uint32_t host_n
     Fields fields;
     fields.u8(wire::PROTOCOL_VERSION);
     fields.u32(host_nonce);
-    fields.u32(boot_nonce);
+    fields.u32(last_boot.nonce);
     fields.u32(wire::SPEC_HASH);
     fields.u8(VERSION_MAJOR);
     fields.u8(VERSION_MINOR);
     fields.u8(VERSION_PATCH);
+    fields.u8(static_cast<uint8_t>(last_boot.cause));
+    fields.u8(last_boot.interrupted ? 1 : 0);
+    fields.u8(wire::JOINTS);
     fields.ledger(motion::ledger());
     return encode(encoded, report.expected_seq, wire::MessageType::WELCOME, fields);
 }
@@ -96,12 +104,17 @@ uint8_t status(uint8_t* encoded, const session::Report& report) {
     Fields fields;
     fields.u8(static_cast<uint8_t>(supervisor::state()));
     fields.u8(static_cast<uint8_t>(supervisor::fault()));
+    fields.u8(supervisor::fault_detail());
     fields.u8(static_cast<uint8_t>(report.refusal));
     fields.u8(report.refusal_seq);
-    fields.u8(motion::free_slots());
+    fields.u16(motion::free_bytes());
     fields.u8(report.crc_errors);
     fields.u8(hal::serial_overruns());
     fields.u8(hal::serial_ring_full());
+    fields.u8(hal::hold_count());
+    fields.u8(inputs::report());
+    fields.u8(motion::override_percent());
+    fields.u8(motion::rate_percent());
     fields.u32(ledger.ticks);
     fields.ledger(ledger);
     return encode(encoded, report.expected_seq, wire::MessageType::STATUS, fields);

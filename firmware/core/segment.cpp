@@ -1,28 +1,13 @@
 #include "segment.h"
 
+#include "fixed.h"
+
 namespace planarm {
 
 namespace {
 
 constexpr uint32_t LEAST_INTERVAL_Q16 = static_cast<uint32_t>(wire::MIN_INTERVAL_TICKS) << 16;
 constexpr uint32_t MOST_INTERVAL_Q16 = static_cast<uint32_t>(wire::MAX_INTERVAL_TICKS) << 16;
-
-// Not inline: on its own it is one multiplication of 16 bits, inlined the compiler widens it to 32.
-__attribute__((noinline)) uint32_t multiply_16(uint16_t a, uint16_t b) {
-    return static_cast<uint32_t>(a) * b;
-}
-
-// High 32 and low 16 bits of a 32 x 16 bit product.
-struct Product {
-    uint32_t high;
-    uint16_t low;
-};
-
-Product multiply(uint32_t a, uint16_t b) {
-    const uint32_t low = multiply_16(static_cast<uint16_t>(a), b);
-    const uint32_t high = multiply_16(static_cast<uint16_t>(a >> 16), b);
-    return {high + (low >> 16), static_cast<uint16_t>(low)};
-}
 
 bool interval_in_limits(uint32_t interval_q16) {
     return interval_q16 >= LEAST_INTERVAL_Q16 && interval_q16 <= MOST_INTERVAL_Q16;
@@ -32,7 +17,7 @@ bool interval_in_limits(uint32_t interval_q16) {
 bool find_last_interval(const Move& move, uint32_t& last_q16) {
     const uint32_t add = static_cast<uint32_t>(move.add_q16);
     const bool shrinking = move.add_q16 < 0;
-    const Product change = multiply(shrinking ? 0 - add : add, static_cast<uint16_t>(move.steps - 2));
+    const Fixed48 change = multiply(shrinking ? 0 - add : add, static_cast<uint16_t>(move.steps - 2));
     if (change.high > 0xFFFF) return false;
     const uint32_t change_q16 = (change.high << 16) | change.low;
     last_q16 = shrinking ? move.interval_q16 - change_q16 : move.interval_q16 + change_q16;
@@ -51,7 +36,7 @@ void read_move(Reader& reader, Move& move) {
 }
 
 // Checks one joint's move and carries its rest on to the segment's end.
-bool check_move(Move& move, uint32_t duration_ticks, uint32_t& rest_ticks, bool& rest_positive) {
+bool check_move(const Move& move, uint32_t duration_ticks, uint32_t& rest_ticks, bool& rest_positive) {
     if (move.steps == 0) {
         const uint32_t rested = rest_ticks + duration_ticks;
         rest_ticks = rested < rest_ticks ? Rest::FOREVER : rested;
@@ -64,11 +49,10 @@ bool check_move(Move& move, uint32_t duration_ticks, uint32_t& rest_ticks, bool&
     if (last_ticks >= duration_ticks) return false;
 
     const uint32_t gap_ticks = rest_ticks + move.first_ticks;
-    const bool far = gap_ticks < rest_ticks || gap_ticks > MAX_AHEAD_TICKS;
+    const bool far = gap_ticks < rest_ticks;  // beyond what 32 bits hold
     const uint16_t least_ticks =
         move.positive == rest_positive ? wire::MIN_INTERVAL_TICKS : MIN_REVERSAL_TICKS;
     if (!far && gap_ticks < least_ticks) return false;
-    move.near = !far;
     rest_ticks = duration_ticks - last_ticks;
     rest_positive = move.positive;
     return true;
@@ -87,7 +71,7 @@ bool run_ticks(const Move& move, uint32_t& ticks) {
     // n I + n (n - 1) / 2 A = n (first + last) / 2 for n = steps - 1: an integer, so with an odd sum n is
     // even.
     const uint16_t n = static_cast<uint16_t>(move.steps - 1);
-    const Product whole = multiply((first >> 1) + (last >> 1) + (first & last & 1), n);
+    const Fixed48 whole = multiply((first >> 1) + (last >> 1) + (first & last & 1), n);
     const uint16_t odd_half = ((first ^ last) & 1) != 0 ? static_cast<uint16_t>(n >> 1) : 0;
     ticks = whole.high + (static_cast<uint16_t>(whole.low + odd_half) < odd_half ? 1 : 0);
     return true;

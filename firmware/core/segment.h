@@ -15,8 +15,7 @@ struct Move {
     uint32_t interval_q16;
     int32_t add_q16;
     uint16_t steps;
-    bool positive : 1;
-    bool near : 1;  // close enough to the joint's step before for the step interrupt to go on by itself
+    bool positive;
 };
 
 struct Segment {
@@ -36,15 +35,11 @@ struct Rest {
 // Least time between two steps of a joint in opposite directions.
 constexpr uint16_t MIN_REVERSAL_TICKS = wire::MIN_INTERVAL_TICKS + wire::MIN_DIR_SETUP_TICKS;
 
-// Longest wait for which a compare register may be set ahead: the 16-bit timer must still tell early from
-// late.
-constexpr uint16_t MAX_AHEAD_TICKS = wire::MAX_INTERVAL_TICKS;
-
 // Whether all intervals of a move are in their limits; if so, `ticks` are those from its first to its last
 // step.
 bool run_ticks(const Move& move, uint32_t& ticks);
 
-// Reads the fields of the next segment; `near` is left for check_segment.
+// Reads the fields of the next segment.
 void read_segment(Reader& reader, Segment& segment);
 
 // Checks a segment that follows after `rest`, and carries `rest` on to its end. OK or OUT_OF_RANGE.

@@ -1,18 +1,17 @@
 #include "session.h"
 
+#include "commands.h"
 #include "motion.h"
-#include "reader.h"
 #include "reply.h"
 #include "supervisor.h"
 
 namespace planarm {
 namespace session {
 
-using supervisor::Command;
+using supervisor::Event;
 using wire::Fault;
 using wire::MessageType;
 using wire::Result;
-using wire::State;
 
 namespace {
 
@@ -25,8 +24,9 @@ uint32_t host_nonce;
 bool welcome_due;
 bool status_due;
 
-bool reading_segments;  // a SEGMENTS frame is being carried out
-Reader segments;        // what is left of it
+bool checking;  // a SEGMENTS frame is being carried out, segment by segment
+const uint8_t* payload;
+uint8_t payload_bytes;
 
 void note_refusal(Result result, uint8_t seq) {
     if (static_cast<int8_t>(result) >= 0 || refusal != Result::OK) return;
@@ -60,80 +60,58 @@ void hello(const Frame& frame) {
     welcome_due = true;
 }
 
-Result enable(Reader fields, uint32_t now_ticks) {
-    const uint8_t on = fields.u8();
-    if (!fields.ok() || !fields.at_end()) return Result::MALFORMED;
-    if (on > 1) return Result::OUT_OF_RANGE;
-    const Command command = on == 1 ? Command::ENABLE : Command::RELEASE;
-    if (!supervisor::allows(command)) return Result::WRONG_STATE;
-    supervisor::apply(command, now_ticks);
-    return Result::OK;
+Result fail(Result result, Fault fault, uint8_t detail, uint32_t now_ticks) {
+    supervisor::fail(fault, detail, now_ticks);
+    return result;
 }
 
-Result start(Reader fields, uint32_t now_ticks) {
-    const uint32_t lead_ticks = fields.u32();
-    if (!fields.ok() || !fields.at_end()) return Result::MALFORMED;
-    if (lead_ticks < wire::MIN_LEAD_TICKS || lead_ticks > wire::MAX_SEGMENT_TICKS)
-        return Result::OUT_OF_RANGE;
-    if (!supervisor::allows(Command::START) || motion::is_empty()) return Result::WRONG_STATE;
-    supervisor::apply(Command::START, now_ticks);
-    motion::start(now_ticks + lead_ticks);
-    return Result::OK;
-}
-
-Result clear(Reader fields, uint32_t now_ticks) {
-    if (!fields.at_end()) return Result::MALFORMED;
-    if (!supervisor::allows(Command::CLEAR)) return Result::WRONG_STATE;
-    supervisor::apply(Command::CLEAR, now_ticks);
-    refusal = Result::OK;
-    refusal_seq = 0;
-    return Result::OK;
-}
-
-// Stages the next segment of the frame, or commits all after the last. True when the frame is done, with its
+// Checks the next segment of the frame, or queues all after the last. True when the frame is done, with its
 // result.
 bool next_segment(Result& result, uint32_t now_ticks) {
-    if (!supervisor::allows(Command::SEGMENTS)) {
+    if (!supervisor::allows(Event::SEGMENTS)) {
         result = Result::WRONG_STATE;
         return true;
     }
-    if (motion::is_complete()) {
-        result = Result::WRONG_STATE;
-        supervisor::fail(Fault::QUEUE_MISUSE, now_ticks);
-        return true;
-    }
-    result = motion::stage(segments);
-    if (result == Result::BUSY) {
-        motion::discard();
+    result = motion::check_next();
+    if (result == Result::WRONG_STATE) {
+        result = fail(result, Fault::QUEUE_MISUSE, 0, now_ticks);
         return true;
     }
     if (result != Result::OK) {  // a motion with a segment left out must not go on
-        supervisor::fail(Fault::BAD_SEGMENT, now_ticks);
+        result = fail(result, Fault::BAD_SEGMENT, 0, now_ticks);
         return true;
     }
-    if (!segments.at_end()) return false;
-    if (!motion::commit()) result = Result::WRONG_STATE;
+    if (motion::joint_out_of_limits() != wire::JOINTS) {
+        result = fail(Result::OUT_OF_RANGE, Fault::SOFT_LIMIT, motion::joint_out_of_limits(), now_ticks);
+        return true;
+    }
+    if (!motion::is_checked()) return false;
+    if (!motion::commit(payload, payload_bytes)) result = Result::WRONG_STATE;
     return true;
 }
 
+// Begins with a SEGMENTS frame: what can be told of it as a whole.
+void begin_segments(const Frame& frame, uint32_t now_ticks) {
+    if (!supervisor::allows(Event::SEGMENTS)) return finish(Result::WRONG_STATE);
+    if (motion::is_complete()) return finish(fail(Result::WRONG_STATE, Fault::QUEUE_MISUSE, 0, now_ticks));
+    const Result result = motion::begin_check(frame.payload, frame.length);
+    if (result == Result::BUSY) return finish(result);
+    if (result != Result::OK) return finish(fail(result, Fault::BAD_SEGMENT, 0, now_ticks));
+    payload = frame.payload;
+    payload_bytes = frame.length;
+    checking = true;
+}
+
 void execute(const Frame& frame, uint32_t now_ticks) {
-    const Reader fields(frame.payload, frame.length);
-    switch (static_cast<MessageType>(frame.type)) {
-        case MessageType::QUERY:
-            return finish(fields.at_end() ? Result::OK : Result::MALFORMED);
-        case MessageType::ENABLE:
-            return finish(enable(fields, now_ticks));
-        case MessageType::START:
-            return finish(start(fields, now_ticks));
-        case MessageType::CLEAR:
-            return finish(clear(fields, now_ticks));
-        case MessageType::SEGMENTS:
-            segments = fields;
-            reading_segments = true;
-            return;
-        default:
-            return finish(Result::UNKNOWN_TYPE);
+    if (static_cast<MessageType>(frame.type) == MessageType::SEGMENTS)
+        return begin_segments(frame, now_ticks);
+    Reader fields(frame.payload, frame.length);
+    const Result result = commands::execute(static_cast<MessageType>(frame.type), fields, now_ticks);
+    if (result == Result::OK && static_cast<MessageType>(frame.type) == MessageType::CLEAR) {
+        refusal = Result::OK;
+        refusal_seq = 0;
     }
+    finish(result);
 }
 
 }  // namespace
@@ -144,7 +122,7 @@ void reset() {
     refusal = Result::OK;
     refusal_seq = 0;
     crc_errors = 0;
-    welcome_due = status_due = reading_segments = false;
+    welcome_due = status_due = checking = false;
 }
 
 void on_frame(const Frame& frame, uint32_t now_ticks) {
@@ -162,12 +140,12 @@ void on_damage() {
     status_due = true;
 }
 
-bool is_busy() { return reading_segments; }
+bool is_busy() { return checking; }
 
 void advance(uint32_t now_ticks) {
     Result result;
     if (!next_segment(result, now_ticks)) return;
-    reading_segments = false;
+    checking = false;
     finish(result);
 }
 

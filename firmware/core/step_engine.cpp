@@ -1,9 +1,12 @@
 #include "step_engine.h"
 
+#include "clock.h"
+#include "hal_signals.h"
+
 namespace planarm {
 
 StepJoint step_joints[wire::JOINTS];
-volatile bool step_missed;
+volatile uint8_t step_missed;
 
 namespace step_engine {
 
@@ -11,8 +14,10 @@ namespace {
 
 // One run more than can be in use, so that a full ring and an empty one differ.
 constexpr uint8_t RING_RUNS = 4;
-// How far ahead of its first step a joint is started.
-constexpr int32_t START_AHEAD_TICKS = 0x8000;
+// How far ahead of its first step a joint is started: the 16-bit timer must still tell early from late.
+constexpr int32_t START_AHEAD_TICKS = 0x7000;
+// A freeze leaves alone a step that is nearer than this.
+constexpr uint16_t FREEZE_MARGIN_TICKS = 200;
 
 struct Ring {
     Run runs[RING_RUNS];
@@ -20,11 +25,12 @@ struct Ring {
     Run* free;                // the next to be filled
     int32_t position_usteps;  // of all runs taken back
     bool positive;            // direction of the run appended last
+    bool dir_inverted;
 };
 
 Ring rings[wire::JOINTS];
 
-int32_t signed_steps(const Run& run, uint16_t steps) {
+int32_t signed_steps(const Run& run, uint8_t steps) {
     return run.positive ? static_cast<int32_t>(steps) : -static_cast<int32_t>(steps);
 }
 
@@ -56,14 +62,17 @@ void take_back(uint8_t joint) {
 // Places the first edge of an idle joint's next run. False when it is too late for it.
 template <uint8_t JOINT>
 bool start(const Run& run) {
-    const uint16_t margin = hal::dir_is<JOINT>(run.positive) ? STEP_MARGIN_TICKS : DIR_MARGIN_TICKS;
-    hal::dir_write<JOINT>(run.positive);
+    const uint16_t margin = hal::dir_is<JOINT>(run.dir_high) ? STEP_MARGIN_TICKS : DIR_MARGIN_TICKS;
+    hal::dir_write<JOINT>(run.dir_high);
+    hal::set_steps_left<JOINT>(run.steps);
+    hal::set_step_fraction<JOINT>(run.fraction);
     const uint16_t edge = static_cast<uint16_t>(run.first_ticks);
     const hal::InterruptLock lock;
     hal::step_set_edge<JOINT>(edge);
     hal::step_forget_match<JOINT>();
-    const uint16_t remaining = static_cast<uint16_t>(edge - hal::counter());
-    if (static_cast<uint16_t>(remaining - margin) > START_AHEAD_TICKS) return false;
+    const uint16_t nearest = static_cast<uint16_t>(hal::counter() + margin);
+    if (static_cast<int16_t>(edge - nearest) < 0) return false;
+    if (hal::emergency() != hal::Emergency::NONE) return true;
     hal::step_arm<JOINT>();
     hal::step_interrupt_on<JOINT>();
     return true;
@@ -84,17 +93,42 @@ bool start_when_due(uint32_t now_ticks) {
 template <uint8_t JOINT>
 void finish_pulse() {
     if (!hal::step_is_high<JOINT>()) return;
-    Run* const run = step_joints[JOINT].active;
-    if (--run->steps_left == 0) step_joints[JOINT].active = run->next;
+    hal::set_steps_left<JOINT>(static_cast<uint8_t>(hal::steps_left<JOINT>() - 1));
     hal::step_fall<JOINT>();
+}
+
+template <uint8_t JOINT>
+uint8_t executed_steps(const Run& run) {
+    return static_cast<uint8_t>(run.steps - hal::steps_left<JOINT>());
+}
+
+// What a joint that had its interrupt on has executed of its active run goes to the position, and the rest of
+// the run starts at `first_ticks`. The interrupt is off by now.
+template <uint8_t JOINT>
+void cut_active(uint8_t were_on, uint32_t first_ticks) {
+    if ((were_on & hal::step_interrupt_mask<JOINT>()) == 0) return;
+    Run& run = *step_joints[JOINT].active;
+    rings[JOINT].position_usteps += signed_steps(run, executed_steps<JOINT>(run));
+    run.steps = hal::steps_left<JOINT>();
+    run.fraction = hal::step_fraction<JOINT>();
+    run.first_ticks = first_ticks;
+    if (run.steps == 0) step_joints[JOINT].active = run.next;
+}
+
+template <uint8_t JOINT>
+bool may_freeze(uint16_t counter) {
+    if (!hal::step_interrupt_is_on<JOINT>()) return true;
+    return !hal::step_is_high<JOINT>() &&
+           static_cast<uint16_t>(hal::step_edge<JOINT>() - counter) > FREEZE_MARGIN_TICKS;
 }
 
 // What the interrupts change, copied at one instant.
 struct Progress {
     uint16_t counter;
     const Run* active[wire::JOINTS];
-    uint16_t left[wire::JOINTS];
+    uint8_t left[wire::JOINTS];
     bool high[wire::JOINTS];
+    uint8_t on;
 };
 
 Progress progress() {
@@ -103,87 +137,123 @@ Progress progress() {
     copy.counter = hal::counter();
     copy.high[0] = hal::step_is_high<0>();
     copy.high[1] = hal::step_is_high<1>();
-    for (uint8_t joint = 0; joint < wire::JOINTS; ++joint) {
-        copy.active[joint] = step_joints[joint].active;
-        copy.left[joint] = copy.active[joint]->steps_left;
-    }
+    copy.on = hal::step_interrupts_on() | step_missed;
+    copy.left[0] = hal::steps_left<0>();
+    copy.left[1] = hal::steps_left<1>();
+    copy.active[0] = step_joints[0].active;
+    copy.active[1] = step_joints[1].active;
     return copy;
 }
 
 }  // namespace
 
 void reset() {
-    step_missed = false;
+    step_missed = 0;
     for (uint8_t joint = 0; joint < wire::JOINTS; ++joint) {
         clear(joint);
         rings[joint].position_usteps = 0;
+        rings[joint].dir_inverted = false;
     }
 }
 
 bool has_room(uint8_t joint) { return rings[joint].free->next != rings[joint].oldest; }
 
-void append(uint8_t joint, const Move& move, uint32_t start_ticks) {
+void append(uint8_t joint, const Piece& piece) {
     Ring& ring = rings[joint];
     Run& run = *ring.free;
-    run.interval_q16 = move.interval_q16;
-    run.add_q16 = static_cast<uint32_t>(move.add_q16);
-    run.fraction = 0;
-    run.steps_left = run.steps = move.steps;
-    run.first_ticks = start_ticks + move.first_ticks;
-    run.positive = move.positive;
-    const Chain near = move.positive == ring.positive ? Chain::ONWARD : Chain::REVERSED;
-    ring.positive = move.positive;
+    run.interval_q16 = piece.interval_q16;
+    run.add_q16 = piece.add_q16;
+    run.fraction = piece.fraction;
+    run.steps = piece.steps;
+    run.first_ticks = piece.first_ticks;
+    run.positive = piece.positive;
+    run.dir_high = piece.positive != ring.dir_inverted;
+    const Chain near = piece.positive == ring.positive ? Chain::ONWARD : Chain::REVERSED;
+    ring.positive = piece.positive;
     hal::compiler_barrier();
-    run.chained = move.near ? near : Chain::NONE;
+    run.chained = piece.near ? near : Chain::NONE;
     ring.free = run.next;
 }
 
 bool serve(uint32_t now_ticks) {
-    if (!start_when_due<0>(now_ticks) || !start_when_due<1>(now_ticks)) step_missed = true;
+    if (missed()) return false;
+    if (!start_when_due<0>(now_ticks) || !start_when_due<1>(now_ticks)) {
+        const hal::InterruptLock lock;
+        if (step_missed == 0) step_missed = STEP_MISSED_AT_START | hal::step_interrupts_on();
+        hal::steps_off();
+    }
     for (uint8_t joint = 0; joint < wire::JOINTS; ++joint) take_back(joint);
-    return !step_missed;
+    return step_missed == 0;
 }
 
 void stop() {
+    uint8_t on;
     {
         const hal::InterruptLock lock;
+        on = step_missed | hal::step_interrupts_on();
         hal::steps_off();
-        hal::wait_step_high();
-        finish_pulse<0>();
-        finish_pulse<1>();
     }
+    hal::wait_step_high();
+    finish_pulse<0>();
+    finish_pulse<1>();
+    cut_active<0>(on, 0);
+    cut_active<1>(on, 0);
     for (uint8_t joint = 0; joint < wire::JOINTS; ++joint) {
         take_back(joint);
-        Ring& ring = rings[joint];
-        const Run* const active = step_joints[joint].active;
-        if (active != ring.free) {
-            ring.position_usteps +=
-                signed_steps(*active, static_cast<uint16_t>(active->steps - active->steps_left));
-        }
         clear(joint);
     }
-    step_missed = false;
+    step_missed = 0;
+}
+
+bool freeze(uint32_t& now_ticks) {
+    uint8_t on;
+    uint16_t counter;
+    {
+        const hal::InterruptLock lock;
+        counter = hal::counter();
+        if (!may_freeze<0>(counter) || !may_freeze<1>(counter)) return false;
+        on = hal::step_interrupts_on();
+        hal::steps_off();
+    }
+    now_ticks = clock::extend(counter);
+    cut_active<0>(on, now_ticks + static_cast<uint16_t>(hal::step_edge<0>() - counter));
+    cut_active<1>(on, now_ticks + static_cast<uint16_t>(hal::step_edge<1>() - counter));
+    for (uint8_t joint = 0; joint < wire::JOINTS; ++joint) take_back(joint);
+    return true;
+}
+
+void shift(uint32_t ticks) {
+    for (uint8_t joint = 0; joint < wire::JOINTS; ++joint) {
+        for (Run* run = step_joints[joint].active; run != rings[joint].free; run = run->next) {
+            run->first_ticks += ticks;
+        }
+    }
 }
 
 Position position() {
     const Progress now = progress();
     Position total;
     total.counter = now.counter;
+    constexpr uint8_t masks[] = {hal::step_interrupt_mask<0>(), hal::step_interrupt_mask<1>()};
     for (uint8_t joint = 0; joint < wire::JOINTS; ++joint) {
         const Ring& ring = rings[joint];
         int32_t usteps = ring.position_usteps;
         for (const Run* run = ring.oldest; run != now.active[joint]; run = run->next) {
             usteps += signed_steps(*run, run->steps);
         }
-        if (now.active[joint] != ring.free) {
+        if ((now.on & masks[joint]) != 0) {
             const Run& run = *now.active[joint];
-            usteps += signed_steps(
-                run, static_cast<uint16_t>(run.steps - now.left[joint] + (now.high[joint] ? 1 : 0)));
+            const uint8_t risen = now.high[joint] ? 1 : 0;
+            usteps += signed_steps(run, static_cast<uint8_t>(run.steps - now.left[joint] + risen));
         }
         total.usteps[joint] = usteps;
     }
     return total;
 }
+
+void set_dir_inverted(uint8_t joint, bool inverted) { rings[joint].dir_inverted = inverted; }
+
+void set_position(uint8_t joint, int32_t usteps) { rings[joint].position_usteps = usteps; }
 
 }  // namespace step_engine
 }  // namespace planarm

@@ -3,7 +3,8 @@
 //
 // Two sides share a ring: the main program appends runs and takes executed ones back, the step interrupt
 // works on `active` and moves on along `next`. The interrupt alone goes on to a run marked `chained`; before
-// any other it leaves the joint idle, and the main program starts it again when it is due.
+// any other it leaves the joint idle, and the main program starts it again when it is due. Steps left and
+// fraction of the active run are where the interrupt reaches them fastest: hal::steps_left, step_fraction.
 #pragma once
 
 #include <stdint.h>
@@ -20,13 +21,13 @@ enum class Chain : uint8_t { NONE = 0, ONWARD = 1, REVERSED = 2 };
 struct Run {
     uint32_t interval_q16;  // from the current step to the next
     uint32_t add_q16;       // what the next interval has more, modulo 2^32
-    uint16_t fraction;      // of the current step's tick, in 2^-16
-    uint16_t steps_left;    // the current step included
     uint32_t first_ticks;   // tick of the first step on the 32-bit clock
+    uint16_t fraction;      // of the first step's tick, in 2^-16
     Run* next;
-    uint16_t steps;
-    bool positive;
+    uint8_t steps;
     volatile Chain chained;  // written last
+    bool positive;           // the position grows
+    bool dir_high;
 };
 
 struct StepJoint {
@@ -34,13 +35,20 @@ struct StepJoint {
 };
 
 extern StepJoint step_joints[wire::JOINTS];
-extern volatile bool step_missed;  // a step came too late to be placed; both joints are disarmed
+// Not 0 after a step that came too late to be placed: both joints are disarmed, and these interrupts were on
+// (hal::step_interrupt_mask), or STEP_MISSED_AT_START.
+extern volatile uint8_t step_missed;
+constexpr uint8_t STEP_MISSED_AT_START = 0x80;
 
 namespace step_engine {
 
-// Distance that an edge must still have when it is placed: the low time, which also covers the way to the
-// arming write.
-constexpr uint16_t STEP_MARGIN_TICKS = wire::MIN_STEP_LOW_TICKS;
+// Most steps of one run.
+constexpr uint8_t MAX_RUN_STEPS = 255;
+
+// Distance that an edge must still have when the interrupt looks at the timer, LOOK_AFTER_FALL_TICKS after
+// the fall: the low time, which also covers the way to the compare register.
+constexpr uint16_t LOOK_AFTER_FALL_TICKS = 2;
+constexpr uint16_t STEP_MARGIN_TICKS = wire::MIN_STEP_LOW_TICKS - LOOK_AFTER_FALL_TICKS;
 // The same after a change of DIR.
 constexpr uint16_t DIR_MARGIN_TICKS = wire::MIN_DIR_SETUP_TICKS;
 
@@ -55,66 +63,86 @@ void reset();
 // True while `joint` can take another run.
 bool has_room(uint8_t joint);
 
-// Appends the run of `move` that starts at `start_ticks`; has_room must hold.
-void append(uint8_t joint, const Move& move, uint32_t start_ticks);
+// A run to be appended.
+struct Piece {
+    uint32_t first_ticks;
+    uint32_t interval_q16;
+    uint32_t add_q16;
+    uint16_t fraction;
+    uint8_t steps;
+    bool positive;
+    bool near;  // close enough to the joint's step before for the step interrupt to go on by itself
+};
+
+// Appends a run; has_room must hold.
+void append(uint8_t joint, const Piece& piece);
+
+// Sets which level of DIR is the positive direction; the joint must be at rest.
+void set_dir_inverted(uint8_t joint, bool inverted);
 
 // Starts idle joints whose next run is due soon and takes executed runs back. False when a step came too
 // late.
 bool serve(uint32_t now_ticks);
 
 // True from a missed step to the stop that follows.
-inline bool missed() { return step_missed; }
+inline bool missed() { return step_missed != 0; }
 
 // Stops both joints at once and drops all runs. Steps that have risen are counted.
 void stop();
 
+// Puts all joints to rest in the middle of what they do, at the tick returned in `now_ticks`; runs keep their
+// distance to that tick. False, and nothing is changed, while a step is about to rise or a pulse is high.
+bool freeze(uint32_t& now_ticks);
+
+// Moves all runs by `ticks`; all joints must be idle.
+void shift(uint32_t ticks);
+
 // Signed steps since start-up at this instant, a pulse that is still high included.
 Position position();
+
+// Sets the position of a joint without runs.
+void set_position(uint8_t joint, int32_t usteps);
 
 // Counts the step that has just risen and places the next one: the step interrupt in plain C++. The native
 // board runs it; hal/uno/step_interrupts.cpp does the same, statement by statement, in assembler.
 template <uint8_t JOINT>
 HAL_INLINE void on_match() {
     Run* const run = step_joints[JOINT].active;
-    const uint16_t left = static_cast<uint16_t>(run->steps_left - 1);
-    run->steps_left = left;
+    const uint8_t left = static_cast<uint8_t>(hal::steps_left<JOINT>() - 1);
+    hal::set_steps_left<JOINT>(left);
+    uint16_t edge;
+    uint16_t margin = STEP_MARGIN_TICKS;
     if (left != 0) {
-        const uint32_t ahead = run->interval_q16 + run->fraction;
-        run->fraction = static_cast<uint16_t>(ahead);
-        const uint16_t ahead_ticks = static_cast<uint16_t>(ahead >> 16);
-        const uint16_t edge = static_cast<uint16_t>(hal::step_edge<JOINT>() + ahead_ticks);
-        hal::step_set_edge<JOINT>(edge);
+        const uint32_t ahead = run->interval_q16 + hal::step_fraction<JOINT>();
+        hal::set_step_fraction<JOINT>(static_cast<uint16_t>(ahead));
+        edge = static_cast<uint16_t>(hal::step_edge<JOINT>() + (ahead >> 16));
+        run->interval_q16 += run->add_q16;
         hal::step_fall<JOINT>();
-        const uint16_t remaining = static_cast<uint16_t>(edge - hal::counter());
-        if (static_cast<uint16_t>(remaining - STEP_MARGIN_TICKS) < ahead_ticks) {
-            hal::step_arm<JOINT>();
-            hal::compiler_barrier();  // reading the interval again costs less than saving registers for it
-            run->interval_q16 += run->add_q16;
-            return;
-        }
     } else {
         Run* const next = run->next;
         step_joints[JOINT].active = next;
         const Chain chained = next->chained;
+        hal::set_steps_left<JOINT>(next->steps);
+        hal::set_step_fraction<JOINT>(next->fraction);
+        edge = static_cast<uint16_t>(next->first_ticks);
+        hal::step_fall<JOINT>();
         if (chained == Chain::NONE) {
-            hal::step_fall<JOINT>();
+            hal::step_disarm<JOINT>();
             hal::step_interrupt_off<JOINT>();
             return;
         }
-        const uint16_t edge = static_cast<uint16_t>(next->first_ticks);
-        hal::step_set_edge<JOINT>(edge);
-        hal::step_fall<JOINT>();
-        const bool reversed = chained == Chain::REVERSED;
-        if (reversed) hal::dir_write<JOINT>(next->positive);
-        const uint16_t margin = reversed ? DIR_MARGIN_TICKS : STEP_MARGIN_TICKS;
-        const uint16_t remaining = static_cast<uint16_t>(edge - hal::counter());
-        if (static_cast<uint16_t>(remaining - margin) <= MAX_AHEAD_TICKS) {
-            hal::step_arm<JOINT>();
-            return;
+        if (chained == Chain::REVERSED) {
+            hal::dir_write<JOINT>(next->dir_high);
+            margin = DIR_MARGIN_TICKS;
         }
     }
+    const uint16_t nearest = static_cast<uint16_t>(hal::counter() + margin);
+    if (static_cast<int16_t>(edge - nearest) >= 0) {
+        hal::step_set_edge<JOINT>(edge);
+        return;
+    }
+    step_missed = hal::step_interrupts_on();
     hal::steps_off();
-    step_missed = true;
 }
 
 }  // namespace step_engine

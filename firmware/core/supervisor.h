@@ -1,5 +1,5 @@
-// States, the commands that each allows, and the first fault. What a change of state does to drivers and
-// motion is in supervisor.cpp; nothing else switches the drivers.
+// States, what each event does in each of them, and the first fault: a table (supervisor.cpp). Nothing else
+// switches the drivers, drops a motion or tells it to rest.
 #pragma once
 
 #include <stdint.h>
@@ -9,25 +9,53 @@
 namespace planarm {
 namespace supervisor {
 
-enum class Command : uint8_t { ENABLE, RELEASE, SEGMENTS, START, CLEAR };
+enum class Event : uint8_t {
+    // from the host
+    ENABLE,
+    RELEASE,
+    SEGMENTS,
+    START,
+    CLEAR,
+    HOLD,
+    RESUME,
+    STOP,
+    QUICK_STOP,
+    CONFIG,
+    SOFT_LIMITS,
+    HOME,
+    SET_POSITION,
+    // from the motion
+    AT_REST,
+    STARVED,
+    FED,
+    DONE,
+};
+
+enum class Outcome : uint8_t {
+    NONE,
+    ENERGISE,
+    RELEASE,       // drops the motion, forgets the fault and releases the drivers
+    DROP,          // drops the motion, at rest
+    GO,            // the path clock goes on
+    REST,          // it slows down to rest
+    REST_QUICKLY,  // at once as the segments allow
+};
 
 // Idle, without a fault. For start-up.
 void reset();
 
 wire::State state();
 wire::Fault fault();
+uint8_t fault_detail();
 
-// True when the state takes the command.
-bool allows(Command command);
+// True when the table has a row for the event in this state.
+bool allows(Event event);
 
-// Carries out the change of state that an allowed command brings.
-void apply(Command command, uint32_t now_ticks);
-
-// The motion came to its end.
-void motion_done();
+// Carries out the event's row. An event without one changes nothing.
+void apply(Event event, uint32_t now_ticks);
 
 // Stops the steps and latches the fault. In the fault state nothing happens that could bring another.
-void fail(wire::Fault fault, uint32_t now_ticks);
+void fail(wire::Fault fault, uint8_t detail, uint32_t now_ticks);
 
 }  // namespace supervisor
 }  // namespace planarm

@@ -11,9 +11,9 @@ from typing import ClassVar, Final, NamedTuple, TypeAlias
 
 from planarm_wire.layout import END, Field
 
-PROTOCOL_VERSION: Final = 1
+PROTOCOL_VERSION: Final = 2
 """Both ends must have the same."""
-SPEC_HASH: Final = 0xD92A41EC
+SPEC_HASH: Final = 0x6578D960
 """Hash of the specification without its wording."""
 DELIMITER: Final = 0x7E
 """Ends every frame."""
@@ -23,6 +23,17 @@ ESCAPE_XOR: Final = 0x20
 """An escaped byte is its code xor this."""
 RESERVED: Final = (0x7B, 0x7C)
 """Never inside a frame; receivers drop them."""
+HOLD_CODE: Final = 0x7B
+"""Out of band, 1 in a row: slows down along the path and rests there; RESUME goes on."""
+HOLD_REPEATS: Final = 1
+"""How often in a row the code must come."""
+EMERGENCY_CODE: Final = 0x7C
+"""Out of band, 3 in a row: ends all pulses at once.
+
+The position is lost. A real emergency stop cuts the motors' supply.
+"""
+EMERGENCY_REPEATS: Final = 3
+"""How often in a row the code must come."""
 CRC_INITIAL: Final = 0xFFFF
 """CRC-16/MCRF4XX (reflected 0x1021, initial 0xFFFF, no final xor); sent low byte first."""
 HEADER_BYTES: Final = 3
@@ -41,22 +52,43 @@ RX_RING_BYTES: Final = 128
 """Receive ring of the firmware."""
 HOST_WINDOW_BYTES: Final = 112
 """Most unacknowledged bytes, as encoded, the host may have in flight."""
-QUEUE_SLOTS: Final = 32
-"""Segments the firmware holds."""
-MIN_INTERVAL_TICKS: Final = 320
+QUEUE_BYTES: Final = 896
+"""Bytes of queued segments that the firmware holds: a SEGMENTS frame takes its payload and queue_frame_bytes."""
+QUEUE_FRAME_BYTES: Final = 1
+"""Bytes that each queued SEGMENTS frame takes besides its payload."""
+MIN_INTERVAL_TICKS: Final = 230
 """Least time between two steps of one joint; min_dir_setup_ticks more where it turns round."""
+NEED_UNIT_TICKS: Final = 32_768
+"""Unit of a segment's need, 2.048 ms."""
+MAX_STRETCH: Final = 4_096
+"""Most by which the device stretches the path clock."""
+GENTLE_PERCENT: Final = 50
+"""Share of slow and fast that hold, stop, resume and override use; quick stop and a starving queue use all of slow."""
+DEFAULT_START_STOP_TICKS: Final = 160_000
+"""Interval of the start-stop speed until CONFIG tells it, 100 steps/s."""
+DEFAULT_WAKE_TICKS: Final = 160_000
+"""Least time from ENABLE to the first step until CONFIG tells it, 10 ms."""
+WATCHDOG_MS: Final = 250
+"""The watchdog resets the chip when the main program stands still for so long."""
+DEBOUNCE_TICKS: Final = 80_000
+"""A limit switch counts when it stays so for this long, 5 ms."""
 MAX_INTERVAL_TICKS: Final = 60_000
 """Largest interval inside a run of more than one step; longer gaps need a segment of their own."""
+CALM_SEGMENT_TICKS: Final = 65_536
+"""Longest segment in which a joint may be faster than its start-stop speed, 4.1 ms.
+
+The device changes the path clock's rate from segment to segment.
+"""
 MAX_SEGMENT_TICKS: Final = 1_073_741_823
 """Longest segment, about 67 s."""
 MAX_SEGMENT_STEPS: Final = 32_767
 """Most steps of one joint in one segment."""
 MIN_LEAD_TICKS: Final = 16_000
 """Least lead of START, 1 ms."""
-MIN_STEP_HIGH_TICKS: Final = 32
-"""Least high time of a step pulse, 2 us."""
-MIN_STEP_LOW_TICKS: Final = 32
-"""Least low time of a step pulse, 2 us."""
+MIN_STEP_HIGH_TICKS: Final = 56
+"""Least high time of a step pulse, 3.5 us."""
+MIN_STEP_LOW_TICKS: Final = 40
+"""Least low time of a step pulse, 2.5 us."""
 MIN_DIR_SETUP_TICKS: Final = 320
 """Least time from a DIR edge to the next rising STEP edge, 20 us."""
 STEP_PINS: Final = ("D9", "D10")
@@ -80,7 +112,12 @@ class MessageType(IntEnum):
     Energises (1) or releases (0) the drivers: idle to ready, ready to idle. Releasing drops queued segments.
     """
     SEGMENTS = 4
-    """From the host. Appends segments, all or none. A broken limit latches bad_segment."""
+    """From the host.
+
+    Appends segments, all or none. A broken limit latches bad_segment. The head holds for all segments of the
+    message. A rate is a code c of the value v = c below 16, else (16 + c mod 16) 2^(c div 16 - 1), and means v
+    2^-32 a tick: the path clock's rate, 1 when not stretched, may change by that much in each tick.
+    """
     START = 5
     """From the host. Begins the queued motion: the first segment starts lead_ticks from now."""
     CLEAR = 6
@@ -89,6 +126,44 @@ class MessageType(IntEnum):
     Clears a latched fault and the refusal, drops the queue and releases the drivers: fault, ready or idle to idle.
     Position counters stay.
     """
+    RESUME = 7
+    """From the host.
+
+    Goes on after a hold, also one that is still slowing down. In any other state it changes nothing.
+    """
+    OVERRIDE = 8
+    """From the host.
+
+    Sets the rate of the path clock, for this motion and those after it. The rate changes within the segments'
+    allowances.
+    """
+    STOP = 9
+    """From the host.
+
+    Slows down along the path, then drops the rest of the motion; the position is kept. Answered at once; the stop
+    is over when STATUS tells ready.
+    """
+    CONFIG = 0xA
+    """From the host.
+
+    Tells the arm's wiring and drivers; only in state idle. Until it comes, and after every reset, the defaults of
+    the limits hold, nothing is inverted, and no input is used.
+    """
+    SOFT_LIMITS = 0xB
+    """From the host.
+
+    Tells where each joint may be, in terms of the ledger's position; segments that leave it latch soft_limit. Least
+    above most: no limit, as after a reset.
+    """
+    HOME = 0xC
+    """From the host.
+
+    Moves one joint to its limit switch and off it again, slowly the second time. Only in state ready, with limit
+    switches watched. The order of the joints is the host's. Ends in ready with the joint's position set, or in
+    homing_failed.
+    """
+    SET_POSITION = 0xD
+    """From the host. Tells the position of an arm at rest: the ledger counts on from there. Only in idle and ready."""
     WELCOME = 0x81
     """From the device. Answers HELLO."""
     STATUS = 0x82
@@ -107,9 +182,22 @@ class State(IntEnum):
     READY = 1
     """Drivers enabled, at rest; segments may be queued."""
     RUNNING = 2
-    """Executing segments; more may be queued."""
+    """Executing segments, slowed down while the queue starves; more may be queued."""
     FAULT = 3
-    """Pulses stopped, first fault latched, drivers keep holding; CLEAR leads to idle."""
+    """Pulses stopped, first fault latched, drivers keep holding.
+
+    An emergency stop may release them. CLEAR leads to idle.
+    """
+    HOLDING = 4
+    """Slowing down along the path towards a hold."""
+    HELD = 5
+    """At rest on the path after a hold; RESUME goes on, STOP drops the rest."""
+    STARVED = 6
+    """At rest on the path because the queue ran low; goes on by itself when it is filled."""
+    STOPPING = 7
+    """Slowing down along the path; then the rest is dropped and the state is ready."""
+    HOMING = 8
+    """Moving one joint to its limit switch."""
 
 
 class Fault(IntEnum):
@@ -125,6 +213,40 @@ class Fault(IntEnum):
     """A segment broke a limit of the protocol."""
     QUEUE_MISUSE = 4
     """Segments arrived after the last segment of a motion."""
+    EMERGENCY_STOP = 5
+    """An emergency stop came over the line; the position is lost."""
+    STOP_INPUT = 6
+    """The stop input opened; the position is lost."""
+    LIMIT_SWITCH = 7
+    """A limit switch closed during a motion; detail tells the joint."""
+    SOFT_LIMIT = 8
+    """A segment would leave a joint's soft limits; detail tells the joint."""
+    HOMING_FAILED = 9
+    """The limit switch was not found, or did not open again; detail tells the joint."""
+
+
+class Reset(IntEnum):
+    """Why the device last started."""
+
+    UNKNOWN = 0
+    """The chip does not tell, and its memory was in use before: the reset line, or a short loss of power."""
+    POWER_ON = 1
+    """Power came on."""
+    EXTERNAL = 2
+    """The reset line, as when a port is opened."""
+    BROWN_OUT = 3
+    """The supply fell below the brown-out level."""
+    WATCHDOG = 4
+    """The main program stood still and the watchdog reset the chip."""
+
+
+class PinMap(IntEnum):
+    """Where the drivers are wired."""
+
+    OWN = 0
+    """Own wiring: STEP on the compare outputs D9 and D10."""
+    CNC_SHIELD = 1
+    """The Arduino CNC shield: STEP on D2 and D3 by interrupt, at a lower rate."""
 
 
 class Result(IntEnum):
@@ -170,6 +292,23 @@ FAULT_WORDS: Final[dict[Fault, Words]] = {
         "host and firmware disagree: flash the released image",
     ),
     Fault.QUEUE_MISUSE: Words("segments arrived after the last segment of a motion", "wait until the motion is done"),
+    Fault.EMERGENCY_STOP: Words(
+        "an emergency stop came over the line; the position is lost",
+        "home the arm before the next motion",
+    ),
+    Fault.STOP_INPUT: Words("the stop input opened; the position is lost", "close the stop circuit, then home the arm"),
+    Fault.LIMIT_SWITCH: Words(
+        "a limit switch closed during a motion; detail tells the joint",
+        "move the arm off the switch by hand or jog, and check the limits of the plan",
+    ),
+    Fault.SOFT_LIMIT: Words(
+        "a segment would leave a joint's soft limits; detail tells the joint",
+        "check the start position, or the limits in the scene",
+    ),
+    Fault.HOMING_FAILED: Words(
+        "the limit switch was not found, or did not open again; detail tells the joint",
+        "check the switch, its polarity and the homing distance",
+    ),
 }
 """The words of each fault."""
 
@@ -286,13 +425,24 @@ class Enable:
 class Segments:
     """Appends segments, all or none.
 
-    A broken limit latches bad_segment.
+    A broken limit latches bad_segment. The head holds for all segments of the message. A rate is a code c of the
+    value v = c below 16, else (16 + c mod 16) 2^(c div 16 - 1), and means v 2^-32 a tick: the path clock's rate, 1
+    when not stretched, may change by that much in each tick.
 
-    From the host, payload 3 to 48 bytes.
+    From the host, payload 6 to 48 bytes.
     """
 
     TYPE: ClassVar[MessageType] = MessageType.SEGMENTS
 
+    slow: int
+    """Rate code: largest slowing of the path clock; 0: it must not be slowed. (u8)"""
+    fast: int
+    """Rate code: largest speeding up of the path clock. (u8)"""
+    need: int
+    """Path time needed to come to rest from the first segment's start, rounded up; 255: that or more.
+
+    (need_unit_ticks, u8)
+    """
     segments: tuple[Segment, ...]
     """In the order of their execution. (segment)"""
 
@@ -323,10 +473,149 @@ class Clear:
 
 
 @dataclass(frozen=True, slots=True)
+class Resume:
+    """Goes on after a hold, also one that is still slowing down.
+
+    In any other state it changes nothing.
+
+    From the host, payload 0 bytes.
+    """
+
+    TYPE: ClassVar[MessageType] = MessageType.RESUME
+
+
+@dataclass(frozen=True, slots=True)
+class Override:
+    """Sets the rate of the path clock, for this motion and those after it.
+
+    The rate changes within the segments' allowances.
+
+    From the host, payload 1 byte.
+    """
+
+    TYPE: ClassVar[MessageType] = MessageType.OVERRIDE
+
+    percent: int
+    """1 to 100. (%, u8)"""
+
+
+@dataclass(frozen=True, slots=True)
+class Stop:
+    """Slows down along the path, then drops the rest of the motion; the position is kept.
+
+    Answered at once; the stop is over when STATUS tells ready.
+
+    From the host, payload 1 byte.
+    """
+
+    TYPE: ClassVar[MessageType] = MessageType.STOP
+
+    quick: int
+    """1 slows down as fast as the segments allow, 0 by gentle_percent of that. (u8)"""
+
+
+@dataclass(frozen=True, slots=True)
+class Config:
+    """Tells the arm's wiring and drivers; only in state idle.
+
+    Until it comes, and after every reset, the defaults of the limits hold, nothing is inverted, and no input is
+    used.
+
+    From the host, payload 22 bytes.
+    """
+
+    TYPE: ClassVar[MessageType] = MessageType.CONFIG
+
+    pin_map: PinMap
+    """Where the drivers are wired. (u8)"""
+    joints: int
+    """Joints that segments tell of. (u8)"""
+    dir_inverted: int
+    """Bit j: DIR of joint j is low for the positive direction. (u8)"""
+    options: int
+    """A set of bits.
+
+    0: ENABLE is active high; 1: an emergency stop releases the drivers; 2: the stop input is watched; 3: limit
+    switches are watched; 4: limit switches open when hit. (u8)
+    """
+    idle_ms: int
+    """Drivers are released after so long in state ready; 0: never. (ms, u32)"""
+    wake_ticks: int
+    """Least time from ENABLE to the first step. (ticks, u32)"""
+    high_ticks: int
+    """Least high time of a step pulse that the drivers need.
+
+    This firmware takes up to min_step_high_ticks. (ticks, u16)
+    """
+    start_stop_ticks: tuple[int, ...]
+    """Interval of each joint's start-stop speed, from which it may stop dead. (ticks, 2 x u32)"""
+
+
+@dataclass(frozen=True, slots=True)
+class SoftLimits:
+    """Tells where each joint may be, in terms of the ledger's position; segments that leave it latch soft_limit.
+
+    Least above most: no limit, as after a reset.
+
+    From the host, payload 16 bytes.
+    """
+
+    TYPE: ClassVar[MessageType] = MessageType.SOFT_LIMITS
+
+    least_usteps: tuple[int, ...]
+    """Of each joint. (usteps, 2 x i32)"""
+    most_usteps: tuple[int, ...]
+    """Of each joint. (usteps, 2 x i32)"""
+
+
+@dataclass(frozen=True, slots=True)
+class Home:
+    """Moves one joint to its limit switch and off it again, slowly the second time.
+
+    Only in state ready, with limit switches watched. The order of the joints is the host's. Ends in ready with the
+    joint's position set, or in homing_failed.
+
+    From the host, payload 22 bytes.
+    """
+
+    TYPE: ClassVar[MessageType] = MessageType.HOME
+
+    joint: int
+    """From 0. (u8)"""
+    positive: int
+    """1 when the switch lies in the positive direction. (u8)"""
+    fast_ticks: int
+    """Interval of the steps towards the switch. (ticks, u32)"""
+    slow_ticks: int
+    """Interval of the steps off it and onto it again. (ticks, u32)"""
+    most_usteps: int
+    """Farthest way to the switch. (usteps, u32)"""
+    back_usteps: int
+    """Farthest way off the switch. (usteps, u32)"""
+    position_usteps: int
+    """Of the place where the switch closes. (usteps, i32)"""
+
+
+@dataclass(frozen=True, slots=True)
+class SetPosition:
+    """Tells the position of an arm at rest: the ledger counts on from there.
+
+    Only in idle and ready.
+
+    From the host, payload 8 bytes.
+    """
+
+    TYPE: ClassVar[MessageType] = MessageType.SET_POSITION
+
+    position_usteps: tuple[int, ...]
+    """Of each joint. (usteps, 2 x i32)"""
+
+
+@dataclass(frozen=True, slots=True)
 class Welcome:
     """Answers HELLO.
 
-    From the device, payload 28 bytes.
+    From the device, payload 31 bytes.
     """
 
     TYPE: ClassVar[MessageType] = MessageType.WELCOME
@@ -341,6 +630,12 @@ class Welcome:
     """First four bytes of the SHA-256 of the specification without its wording (see Specification hash). (u32)"""
     firmware_version: tuple[int, int, int]
     """Major, minor, patch. (3 x u8)"""
+    reset_cause: Reset
+    """Why the device last started, as far as it can be told. (u8)"""
+    interrupted: int
+    """1 when the drivers were enabled at the last reset: the arm may have moved by itself. (u8)"""
+    joints: int
+    """Joints that segments and ledger tell of. (u8)"""
     ledger: Ledger
     """Executed so far. (ledger)"""
 
@@ -351,7 +646,7 @@ class Status:
 
     Sent unasked when a motion ends or a fault latches.
 
-    From the device, payload 24 bytes.
+    From the device, payload 30 bytes.
     """
 
     TYPE: ClassVar[MessageType] = MessageType.STATUS
@@ -360,25 +655,49 @@ class Status:
     """What the device is doing. (u8)"""
     fault: Fault
     """The latched fault, or none. (u8)"""
+    detail: int
+    """Of the fault: the joint, from 0, where a joint is meant. (u8)"""
     refusal: Result
     """First refusal (a negative result) since HELLO or CLEAR; ok (0) when none. (i8)"""
     refusal_seq: int
     """Sequence number of the refused frame. (u8)"""
-    free_slots: int
-    """Segments that can be queued now. (segments, u8)"""
+    free_bytes: int
+    """Room in the queue now, less the bytes of one frame's head. (bytes, u16)"""
     crc_errors: int
     """Frames that failed a check, modulo 256. (u8)"""
     overruns: int
     """Bytes lost in the USART (DOR), modulo 256. (u8)"""
     ring_full: int
     """Bytes lost because the receive ring was full, modulo 256. (u8)"""
+    holds: int
+    """Hold bytes received, modulo 256. (u8)"""
+    inputs: int
+    """Bit j: the limit switch of joint j is hit; bit 7: the stop input is open. (u8)"""
+    override_percent: int
+    """As set. (%, u8)"""
+    rate_percent: int
+    """Of the path clock in the segment prepared last, rounded down. (%, u8)"""
     mcu_ticks: int
     """Clock at the moment of the reply, modulo 2^32. (ticks, u32)"""
     ledger: Ledger
     """Executed so far. (ledger)"""
 
 
-HostMessage: TypeAlias = Hello | Query | Enable | Segments | Start | Clear
+HostMessage: TypeAlias = (
+    Hello
+    | Query
+    | Enable
+    | Segments
+    | Start
+    | Clear
+    | Resume
+    | Override
+    | Stop
+    | Config
+    | SoftLimits
+    | Home
+    | SetPosition
+)
 DeviceMessage: TypeAlias = Welcome | Status
 Struct: TypeAlias = Move | Segment | Ledger
 Message: TypeAlias = HostMessage | DeviceMessage
@@ -390,6 +709,13 @@ MESSAGES: Final[dict[int, type[Message]]] = {
     Segments.TYPE: Segments,
     Start.TYPE: Start,
     Clear.TYPE: Clear,
+    Resume.TYPE: Resume,
+    Override.TYPE: Override,
+    Stop.TYPE: Stop,
+    Config.TYPE: Config,
+    SoftLimits.TYPE: SoftLimits,
+    Home.TYPE: Home,
+    SetPosition.TYPE: SetPosition,
     Welcome.TYPE: Welcome,
     Status.TYPE: Status,
 }
@@ -416,26 +742,66 @@ LAYOUTS: Final[dict[type[Message | Struct], tuple[Field, ...]]] = {
     ),
     Query: (),
     Enable: (Field("on", "u8"),),
-    Segments: (Field("segments", Segment, repeat=END),),
+    Segments: (
+        Field("slow", "u8"),
+        Field("fast", "u8"),
+        Field("need", "u8"),
+        Field("segments", Segment, repeat=END),
+    ),
     Start: (Field("lead_ticks", "u32"),),
     Clear: (),
+    Resume: (),
+    Override: (Field("percent", "u8"),),
+    Stop: (Field("quick", "u8"),),
+    Config: (
+        Field("pin_map", "u8", enum=PinMap),
+        Field("joints", "u8"),
+        Field("dir_inverted", "u8"),
+        Field("options", "u8"),
+        Field("idle_ms", "u32"),
+        Field("wake_ticks", "u32"),
+        Field("high_ticks", "u16"),
+        Field("start_stop_ticks", "u32", repeat=2),
+    ),
+    SoftLimits: (
+        Field("least_usteps", "i32", repeat=2),
+        Field("most_usteps", "i32", repeat=2),
+    ),
+    Home: (
+        Field("joint", "u8"),
+        Field("positive", "u8"),
+        Field("fast_ticks", "u32"),
+        Field("slow_ticks", "u32"),
+        Field("most_usteps", "u32"),
+        Field("back_usteps", "u32"),
+        Field("position_usteps", "i32"),
+    ),
+    SetPosition: (Field("position_usteps", "i32", repeat=2),),
     Welcome: (
         Field("protocol_version", "u8"),
         Field("host_nonce", "u32"),
         Field("boot_nonce", "u32"),
         Field("spec_hash", "u32"),
         Field("firmware_version", "u8", repeat=3),
+        Field("reset_cause", "u8", enum=Reset),
+        Field("interrupted", "u8"),
+        Field("joints", "u8"),
         Field("ledger", Ledger),
     ),
     Status: (
         Field("state", "u8", enum=State),
         Field("fault", "u8", enum=Fault),
+        Field("detail", "u8"),
         Field("refusal", "i8", enum=Result),
         Field("refusal_seq", "u8"),
-        Field("free_slots", "u8"),
+        Field("free_bytes", "u16"),
         Field("crc_errors", "u8"),
         Field("overruns", "u8"),
         Field("ring_full", "u8"),
+        Field("holds", "u8"),
+        Field("inputs", "u8"),
+        Field("override_percent", "u8"),
+        Field("rate_percent", "u8"),
         Field("mcu_ticks", "u32"),
         Field("ledger", Ledger),
     ),

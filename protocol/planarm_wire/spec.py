@@ -16,7 +16,7 @@ from planarm_wire.layout import END, SCALARS
 from planarm_wire.spec_checks import check_different, check_keys, check_range, checked_name, suggestion, table_of
 
 SPEC_PATH: Final = Path(__file__).parents[1] / "messages.toml"
-ENUMS: Final = {"states": "State", "faults": "Fault", "results": "Result"}
+ENUMS: Final = {"states": "State", "faults": "Fault", "resets": "Reset", "pin_maps": "PinMap", "results": "Result"}
 """Sections of codes, and the name of the enumeration made of each."""
 
 _WORDS: Final = frozenset(("doc", "text", "fix"))
@@ -103,6 +103,24 @@ class Framing:
 
 
 @dataclass(frozen=True, slots=True)
+class OutOfBandCode:
+    """A byte outside of frames: its code, how often in a row it must come, and what it does."""
+
+    name: str
+    code: int
+    repeats: int
+    doc: str
+
+
+@dataclass(frozen=True, slots=True)
+class OutOfBand:
+    """Section out_of_band."""
+
+    doc: str
+    codes: tuple[OutOfBandCode, ...]
+
+
+@dataclass(frozen=True, slots=True)
 class Board:
     """Section board: the wiring."""
 
@@ -121,11 +139,14 @@ class Spec:
     doc: str
     spec_hash: int
     framing: Framing
+    out_of_band: OutOfBand
     sequence_doc: str
     limits: tuple[Limit, ...]
     board: Board
     states: tuple[Code, ...]
     faults: tuple[Code, ...]
+    resets: tuple[Code, ...]
+    pin_maps: tuple[Code, ...]
     results: tuple[Code, ...]
     structs: tuple[StructSpec, ...]
     messages: tuple[MessageSpec, ...]
@@ -175,7 +196,7 @@ def _without_words(value: object) -> object:
 
 
 def _spec(data: dict[str, Any]) -> Spec:
-    sections = ("protocol", "framing", "sequence", "limits", "board", *ENUMS, "structs", "messages")
+    sections = ("protocol", "framing", "out_of_band", "sequence", "limits", "board", *ENUMS, "structs", "messages")
     check_keys(data, "top level", sections)
     protocol = table_of(data["protocol"], "protocol", {"name": str, "version": int, "doc": str})
     check_range(protocol["version"], 1, 0xFF, "protocol.version")
@@ -197,11 +218,14 @@ def _spec(data: dict[str, Any]) -> Spec:
         doc=protocol["doc"],
         spec_hash=spec_hash(data),
         framing=framing,
+        out_of_band=_out_of_band(data["out_of_band"], framing.reserved),
         sequence_doc=table_of(data["sequence"], "sequence", {"doc": str})["doc"],
         limits=limits,
         board=_board(data["board"], values["joints"]),
         states=_codes(data["states"], "states", {"code": int, "doc": str}, 0, 0xFF),
         faults=_codes(data["faults"], "faults", {"code": int, "text": str, "fix": str}, 0, 0xFF),
+        resets=_codes(data["resets"], "resets", {"code": int, "doc": str}, 0, 0xFF),
+        pin_maps=_codes(data["pin_maps"], "pin_maps", {"code": int, "doc": str}, 0, 0xFF),
         results=_codes(data["results"], "results", {"code": int, "text": str, "fix": str}, -0x80, 0x7F),
         structs=tuple(structs.values()),
         messages=_messages(data["messages"], values, structs, framing.max_payload_bytes),
@@ -230,6 +254,23 @@ def _framing(value: object) -> Framing:
     if clash:
         raise SpecError(f"framing.escape_xor: an escaped byte would again be special: {sorted(map(hex, clash))}")
     return Framing(**{**table, "reserved": reserved})
+
+
+def _out_of_band(value: object, reserved: tuple[int, ...]) -> OutOfBand:
+    if not isinstance(value, dict):
+        raise SpecError("out_of_band: not a table")
+    doc = table_of({"doc": value.get("doc")}, "out_of_band", {"doc": str})["doc"]
+    found = []
+    for name, entry in value.items():
+        if name == "doc":
+            continue
+        place = f"out_of_band.{checked_name(name, 'out_of_band')}"
+        table = table_of(entry, place, {"code": int, "repeats": int, "doc": str})
+        check_range(table["repeats"], 1, 8, f"{place}.repeats")
+        found.append(OutOfBandCode(name, table["code"], table["repeats"], table["doc"]))
+    if tuple(code.code for code in found) != reserved:
+        raise SpecError(f"out_of_band: the codes must be those of framing.reserved, in order: {reserved}")
+    return OutOfBand(doc, tuple(found))
 
 
 def _limits(value: object) -> tuple[Limit, ...]:

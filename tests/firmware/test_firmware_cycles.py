@@ -20,9 +20,9 @@ STEP_1, STEP_2, RECEIVE, TRANSMIT = 11, 12, 18, 19  # numbers of the vectors, fr
 ENTRY_CYCLES = 4
 INTERRUPTS_ON = 0x80
 
-STEP_CYCLES, ONWARD_CYCLES, REVERSED_CYCLES, IDLE_CYCLES = 104, 86, 96, 64
-MISSED_CYCLES, MISSED_REVERSED_CYCLES = 91, 101
-RECEIVE_CYCLES, OVERRUN_CYCLES, FULL_CYCLES = 38, 44, 36
+STEP_CYCLES, ONWARD_CYCLES, REVERSED_CYCLES, IDLE_CYCLES = 78, 82, 92, 77
+MISSED_CYCLES, MISSED_ONWARD_CYCLES, MISSED_REVERSED_CYCLES = 85, 89, 99
+RECEIVE_CYCLES, OVERRUN_CYCLES, FULL_CYCLES = 40, 46, 40
 TRANSMIT_CYCLES = (34, 36)
 
 
@@ -78,7 +78,7 @@ def play(tracer: Tracer, segments: list[Segment]) -> Board:
     tracer.run = fast  # type: ignore[method-assign]
     board.get_ready()
     for segment in segments:
-        board.ask(Segments((segment,)))
+        board.ask(Segments(0, 0, 0, (segment,)))
     board.send(Start(LEAD_TICKS))
     board.run(LEAD_TICKS - 1000)
     del tracer.run
@@ -119,7 +119,7 @@ def test_step_interrupts(tracer: Tracer, joint: int) -> None:
 
 @pytest.mark.parametrize(
     ("steps", "turns", "cycles"),
-    [(9, False, MISSED_CYCLES), (1, False, MISSED_CYCLES), (1, True, MISSED_REVERSED_CYCLES)],
+    [(9, False, MISSED_CYCLES), (1, False, MISSED_ONWARD_CYCLES), (1, True, MISSED_REVERSED_CYCLES)],
 )
 def test_an_interrupt_that_comes_too_late_stops_both_joints(
     tracer: Tracer, steps: int, turns: bool, cycles: int
@@ -142,7 +142,7 @@ def test_receive_interrupt(tracer: Tracer) -> None:
     board = play(tracer, end_motion([segment_of(200_000, run_of(2))]))
     tracer.done.clear()
     board.send(Query())
-    board.run(20_000)
+    board.run(32_000)
     assert tracer.taken(RECEIVE) == {RECEIVE_CYCLES}
     assert tracer.taken(TRANSMIT) == set(TRANSMIT_CYCLES)
     # Four bytes while interrupts are off: one more than the USART holds.

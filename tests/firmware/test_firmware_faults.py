@@ -8,7 +8,18 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from firmware_board import LEAD_TICKS, Board, Delays, Firmware, NativeFirmware, Schedule, end_motion, run_of, segment_of
+from firmware_board import (
+    LEAD_TICKS,
+    Board,
+    Delays,
+    Firmware,
+    NativeFirmware,
+    Schedule,
+    end_motion,
+    room_after,
+    run_of,
+    segment_of,
+)
 from planarm_wire.codec import encode
 from planarm_wire.framing import encode_frame
 from planarm_wire.messages import (
@@ -19,7 +30,6 @@ from planarm_wire.messages import (
     MAX_SEGMENT_TICKS,
     MIN_DIR_SETUP_TICKS,
     MIN_INTERVAL_TICKS,
-    QUEUE_SLOTS,
     Fault,
     Hello,
     Move,
@@ -79,13 +89,14 @@ BAD = {
 
 @pytest.mark.parametrize("name", GOOD)
 def test_segments_at_their_limits_are_taken(board: Board, name: str) -> None:
-    status = board.ask(Segments((GOOD[name],)))
-    assert (status.state, status.fault, status.free_slots) == (State.READY, Fault.NONE, QUEUE_SLOTS - 1)
+    message = Segments(0, 0, 0, (GOOD[name],))
+    status = board.ask(message)
+    assert (status.state, status.fault, status.free_bytes) == (State.READY, Fault.NONE, room_after(message))
 
 
 @pytest.mark.parametrize("name", BAD)
 def test_segments_beyond_their_limits_are_faults(board: Board, name: str) -> None:
-    status = board.ask(Segments((GOOD["least interval"], BAD[name])))
+    status = board.ask(Segments(0, 0, 0, (GOOD["least interval"], BAD[name])))
     assert (status.state, status.fault, status.refusal) == (State.FAULT, Fault.BAD_SEGMENT, Result.OUT_OF_RANGE)
     assert board.motion_edges() == []
 
@@ -112,7 +123,7 @@ def test_verdict_on_any_move(
         good &= min(ends) >= LEAST * ONE and max(ends) <= MOST * ONE
     board = Board(native_firmware)
     board.get_ready()
-    status = board.ask(Segments((segment_of(duration, move),)))
+    status = board.ask(Segments(0, 0, 0, (segment_of(duration, move),)))
     assert (status.fault is Fault.NONE) == good
 
 
@@ -121,13 +132,13 @@ def test_verdict_on_any_move(
 @pytest.mark.parametrize("together", [True, False])
 def test_least_interval_across_boundaries(board: Board, gap: int, fault: Fault, between: int, together: bool) -> None:
     # Also over segments in which the joint rests, in one frame or in several.
-    rest = [segment_of(100)] * between
-    segments = [segment_of(3001, run_of(3)), *rest, segment_of(5000, run_of(2, first=gap - 1 - 100 * between))]
+    rest = [segment_of(50)] * between
+    segments = [segment_of(3001, run_of(3)), *rest, segment_of(5000, run_of(2, first=gap - 1 - 50 * between))]
     if together:
-        status = board.ask(Segments(tuple(segments)))
+        status = board.ask(Segments(0, 0, 0, tuple(segments)))
     else:
         for segment in segments:
-            status = board.ask(Segments((segment,)))
+            status = board.ask(Segments(0, 0, 0, (segment,)))
     assert status.fault is fault
 
 
@@ -137,19 +148,20 @@ def test_least_time_from_a_step_to_one_back(board: Board, gap: int, fault: Fault
     # The direction is that of the joint's last step, whatever the other joint did and over a rest.
     there = segment_of(3001, run_of(3, positive=positive), run_of(2, positive=not positive))
     back = segment_of(5000, run_of(1, first=gap - 101, positive=not positive))
-    assert board.ask(Segments((there, segment_of(100), back))).fault is fault
+    assert board.ask(Segments(0, 0, 0, (there, segment_of(100), back))).fault is fault
 
 
 def test_a_joint_that_has_not_moved_has_rested_for_ever(board: Board) -> None:
-    status = board.ask(Segments((segment_of(500), segment_of(5000, run_of(2, first=0)))))
-    assert (status.fault, status.free_slots) == (Fault.NONE, QUEUE_SLOTS - 2)
+    message = Segments(0, 0, 0, (segment_of(500), segment_of(5000, run_of(2, first=0))))
+    status = board.ask(message)
+    assert (status.fault, status.free_bytes) == (Fault.NONE, room_after(message))
 
 
 def test_bad_segment_in_motion_stops_the_steps(board: Board) -> None:
-    board.ask(Segments((segment_of(200_000, run_of(190), run_of(90, interval=2000, positive=False)),)))
+    board.ask(Segments(0, 0, 0, (segment_of(200_000, run_of(190), run_of(90, interval=2000, positive=False)),)))
     board.send(Start(LEAD_TICKS))
     board.run(100_000)
-    board.send(Segments((BAD["no duration"],)))
+    board.send(Segments(0, 0, 0, (BAD["no duration"],)))
     board.run(400_000)
     status = board.ask()
     assert (status.state, status.fault) == (State.FAULT, Fault.BAD_SEGMENT)
@@ -162,28 +174,28 @@ def test_bad_segment_in_motion_stops_the_steps(board: Board) -> None:
 
 @pytest.mark.parametrize("state", [State.READY, State.RUNNING])
 def test_segments_after_the_last_are_misuse(board: Board, state: State) -> None:
-    board.ask(Segments((segment_of(1_000_000, run_of(3), last=True),)))
+    board.ask(Segments(0, 0, 0, (segment_of(1_000_000, run_of(3), last=True),)))
     if state is State.RUNNING:
         board.ask(Start(LEAD_TICKS))
-    status = board.ask(Segments((segment_of(1000),)))
+    status = board.ask(Segments(0, 0, 0, (segment_of(1000),)))
     assert (status.state, status.fault) == (State.FAULT, Fault.QUEUE_MISUSE)
 
 
 def test_segments_after_the_last_in_one_frame_are_misuse(board: Board) -> None:
-    status = board.ask(Segments((segment_of(1000, last=True), segment_of(1000))))
+    status = board.ask(Segments(0, 0, 0, (segment_of(1000, last=True), segment_of(1000))))
     assert status.fault is Fault.QUEUE_MISUSE
 
 
 def test_the_first_fault_stays(board: Board) -> None:
-    board.ask(Segments((segment_of(1000, last=True), segment_of(1000))))
-    assert board.ask(Segments((BAD["no duration"],))).fault is Fault.QUEUE_MISUSE
+    board.ask(Segments(0, 0, 0, (segment_of(1000, last=True), segment_of(1000))))
+    assert board.ask(Segments(0, 0, 0, (BAD["no duration"],))).fault is Fault.QUEUE_MISUSE
 
 
-@pytest.mark.parametrize("segments", [1, 2, 5])
+@pytest.mark.parametrize("segments", [6, 8])
 def test_underrun(board: Board, segments: int) -> None:
     motion = [segment_of(30_000, run_of(20), run_of(7, positive=False))] * segments
     for segment in motion:
-        board.ask(Segments((segment,)))
+        board.ask(Segments(0, 0, 0, (segment,)))
     board.send(Start(LEAD_TICKS))
     board.run(60_000 + 30_000 * segments)
     unasked = board.replies[-1][1]
@@ -199,10 +211,10 @@ def test_underrun(board: Board, segments: int) -> None:
 
 def test_segments_that_come_just_before_the_end_are_in_time(board: Board) -> None:
     motion = end_motion([segment_of(60_000, run_of(20))] * 2)
-    board.ask(Segments(motion[:1]))
+    board.ask(Segments(0, 0, 0, motion[:1]))
     board.send(Start(LEAD_TICKS))
     board.run(LEAD_TICKS + 10_000)
-    board.send(Segments(motion[1:]))
+    board.send(Segments(0, 0, 0, motion[1:]))
     board.run(160_000)
     assert board.ask().fault is Fault.NONE
     rises = board.rises(0)
@@ -212,29 +224,32 @@ def test_segments_that_come_just_before_the_end_are_in_time(board: Board) -> Non
 def test_segments_behind_a_long_rest_are_not_late(board: Board) -> None:
     # The end of the queue is over 2^31 ticks away, which must not be taken for the past.
     rest = segment_of(MAX_SEGMENT_TICKS)
-    board.ask(Segments((rest, rest, rest)))
+    board.ask(Segments(0, 0, 0, (rest, rest, rest)))
     board.ask(Start(LEAD_TICKS))
     board.run(100_000)
-    status = board.ask(Segments((rest,)))
-    assert (status.refusal, status.free_slots) == (Result.OK, QUEUE_SLOTS - 4)
+    status = board.ask(Segments(0, 0, 0, (rest,)))
+    assert (status.refusal, status.free_bytes) == (
+        Result.OK,
+        room_after(Segments(0, 0, 0, (rest,) * 3), Segments(0, 0, 0, (rest,))),
+    )
 
 
 def test_segments_that_come_too_late_end_in_an_underrun_at_the_boundary(native_firmware: NativeFirmware) -> None:
     # 2000 ticks before the end there is no time left to prepare more: all that came in time is executed, and no more.
     board = Board(native_firmware)
     board.get_ready()
-    motion = [segment_of(60_000, run_of(50))] * 2
-    board.ask(Segments(tuple(motion[:1])))
+    motion = [segment_of(180_000, run_of(170))] * 2
+    board.ask(Segments(0, 0, 0, tuple(motion[:1])))
     board.send(Start(LEAD_TICKS))
     board.run(LEAD_TICKS + 1500)
-    while board.rises(0)[-1] - board.rises(0)[0] < 49_000:
+    while board.rises(0)[-1] - board.rises(0)[0] < 169_000:
         board.run(500)
     board.run(6500)
-    board.send(Segments(tuple(motion[1:])))
+    board.send(Segments(0, 0, 0, tuple(motion[1:])))
     board.run(200_000)
     status = board.ask()
     assert (status.state, status.fault, status.refusal) == (State.FAULT, Fault.UNDERRUN, Result.WRONG_STATE)
-    assert status.ledger.position_usteps == (50, 0)
+    assert status.ledger.position_usteps == (170, 0)
     assert status.ledger.executed_segments == 1
 
 
@@ -297,7 +312,7 @@ def test_main_program_too_slow_for_the_segments(native_firmware: NativeFirmware)
     board = Board(native_firmware, delays=Delays(pass_ticks=2000))
     board.get_ready()
     for segment in end_motion(motion):
-        board.send(Segments((segment,)))
+        board.send(Segments(0, 0, 0, (segment,)))
         board.run(20_000)
     board.send(Start(LEAD_TICKS))
     board.run(100_000)
@@ -309,7 +324,7 @@ def test_main_program_too_slow_for_the_segments(native_firmware: NativeFirmware)
 
 
 def test_motion_after_a_fault_is_exact(board: Board) -> None:
-    board.ask(Segments((segment_of(30_000, run_of(20), run_of(5, positive=False)),)))
+    board.ask(Segments(0, 0, 0, (segment_of(30_000, run_of(20), run_of(5, positive=False)),)))
     board.send(Start(LEAD_TICKS))
     board.run(100_000)
     before = board.recover().ledger
@@ -326,7 +341,7 @@ class TestHostileStream:
 
     @staticmethod
     def frames() -> list[bytes]:
-        seg = Segments((segment_of(20_000, run_of(9, positive=True), run_of(9)),))
+        seg = Segments(0, 0, 0, (segment_of(20_000, run_of(9, positive=True), run_of(9)),))
         return [encode_frame(seq, *encode(m)) for seq, m in enumerate((Query(), seg, Start(LEAD_TICKS), Hello(1, 7)))]
 
     @staticmethod
@@ -351,7 +366,7 @@ class TestHostileStream:
     def test_bits_flipped_and_ends_cut(self, native_firmware: NativeFirmware, data: st.DataObject) -> None:
         board = Board(native_firmware)
         board.get_ready()
-        board.send(Segments((replace_last(segment_of(30_000, run_of(3))),)))
+        board.send(Segments(0, 0, 0, (replace_last(segment_of(30_000, run_of(3))),)))
         board.run(60_000)
         start = bytearray(encode_frame(board.seq, *encode(Start(LEAD_TICKS))))
         frames = [*self.frames(), bytes(start)]
@@ -370,7 +385,7 @@ class TestHostileStream:
         assert board.hello(nonce=3).host_nonce == 3
 
     def test_the_answer_tells_the_latched_fault(self, board: Board) -> None:
-        board.ask(Segments((BAD["no duration"],)))
+        board.ask(Segments(0, 0, 0, (BAD["no duration"],)))
         self.feed(board, bytes(range(256)) * 3 + bytes([DELIMITER]))
         status = board.ask()
         assert (status.state, status.fault) == (State.FAULT, Fault.BAD_SEGMENT)

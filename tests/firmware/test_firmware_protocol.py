@@ -17,9 +17,11 @@ from firmware_board import (
     NativeFirmware,
     Schedule,
     end_motion,
+    room_after,
     run_of,
     segment_of,
 )
+from planarm_wire.codec import encoded_bytes
 from planarm_wire.framing import encode_frame
 from planarm_wire.messages import (
     DELIMITER,
@@ -27,7 +29,7 @@ from planarm_wire.messages import (
     MAX_SEGMENT_TICKS,
     MIN_LEAD_TICKS,
     PROTOCOL_VERSION,
-    QUEUE_SLOTS,
+    QUEUE_FRAME_BYTES,
     SPEC_HASH,
     Clear,
     Enable,
@@ -61,10 +63,10 @@ def bring_to(board: Board, state: State) -> None:
     board.ask(Enable(1))
     if state is State.READY:
         return
-    board.ask(Segments((segment_of(10_000_000),)))
+    board.ask(Segments(0, 0, 0, (segment_of(10_000_000),)))
     board.ask(Start(LEAD_TICKS))
     if state is State.FAULT:
-        board.ask(Segments((segment_of(0),)))
+        board.ask(Segments(0, 0, 0, (segment_of(0),)))
     assert board.ask().state is state
 
 
@@ -78,7 +80,9 @@ def test_streams_of_the_golden_vectors(board: Board, vector: dict) -> None:
     gives = vector["gives"]
     good = [frame for frame in gives if "error" not in frame]
     assert board.replies
-    hellos = [frame for frame in good if frame["type_code"] == 1 and frame["payload"].startswith("01")]
+    hellos = [
+        frame for frame in good if frame["type_code"] == 1 and frame["payload"].startswith(f"{PROTOCOL_VERSION:02x}")
+    ]
     welcomes = [reply for _, reply in board.replies if isinstance(reply, Welcome)]
     assert len(welcomes) <= len(hellos)
     if hellos:
@@ -158,10 +162,10 @@ def test_wrong_version_is_refused(board: Board) -> None:
 
 def test_a_frame_is_carried_out_once(board: Board) -> None:
     board.get_ready()
-    first = board.ask(Segments((SHORT,)))
-    again = board.ask(Segments((SHORT,)), seq=board.seq - 1)
-    ahead = board.ask(Segments((SHORT,)), seq=board.seq + 1)
-    assert first.free_slots == again.free_slots == ahead.free_slots == QUEUE_SLOTS - 1
+    first = board.ask(Segments(0, 0, 0, (SHORT,)))
+    again = board.ask(Segments(0, 0, 0, (SHORT,)), seq=board.seq - 1)
+    ahead = board.ask(Segments(0, 0, 0, (SHORT,)), seq=board.seq + 1)
+    assert first.free_bytes == again.free_bytes == ahead.free_bytes == room_after(Segments(0, 0, 0, (SHORT,)))
     assert board.replies[-1][0] == board.seq
     assert ahead.refusal is Result.OK
 
@@ -188,7 +192,7 @@ def test_frames_in_a_row_share_replies(native_firmware: NativeFirmware) -> None:
 COMMANDS: dict[str, Message] = {
     "enable": Enable(1),
     "release": Enable(0),
-    "segments": Segments((SHORT,)),
+    "segments": Segments(0, 0, 0, (SHORT,)),
     "start": Start(LEAD_TICKS),
     "clear": Clear(),
 }
@@ -207,7 +211,7 @@ TABLE = {
 }
 
 
-@pytest.mark.parametrize("state", State)
+@pytest.mark.parametrize("state", TABLE)
 @pytest.mark.parametrize("command", COMMANDS)
 def test_commands_by_state(board: Board, state: State, command: str) -> None:
     bring_to(board, state)
@@ -225,7 +229,7 @@ def test_enable_pin_follows_the_state(board: Board) -> None:
     board.get_ready()
     board.ask(Enable(0))
     board.get_ready()
-    board.ask(Segments((segment_of(0),)))  # a fault keeps holding
+    board.ask(Segments(0, 0, 0, (segment_of(0),)))  # a fault keeps holding
     board.ask(Clear())
     assert [(edge.pin, edge.level) for edge in board.edges] == [(ENABLE_PIN, level) for level in (0, 1, 0, 1)]
 
@@ -241,7 +245,7 @@ def test_enable_pin_follows_the_state(board: Board) -> None:
 )
 def test_values_outside_their_limits(board: Board, message: Message, refusal: Result) -> None:
     board.get_ready()
-    board.ask(Segments((SHORT,)))
+    board.ask(Segments(0, 0, 0, (SHORT,)))
     assert board.ask(message).refusal is refusal
 
 
@@ -256,16 +260,26 @@ def test_first_refusal_stays_until_clear_or_hello(board: Board) -> None:
     assert board.ask().refusal is Result.OK
 
 
+def fill(board: Board, message: Segments) -> int:
+    """Queue a message until it fits once more, but not twice; return the bytes left."""
+    taken: list[Segments] = []
+    while room_after(*taken) >= 2 * encoded_bytes(message) + QUEUE_FRAME_BYTES:
+        taken.append(message)
+        assert board.ask(message).free_bytes == room_after(*taken)
+    return room_after(*taken)
+
+
 def test_segments_are_taken_all_or_none(board: Board) -> None:
     board.get_ready()
-    one = segment_of(20_000, run_of(2))
-    for taken in range(1, QUEUE_SLOTS):
-        assert board.ask(Segments((one,))).free_slots == QUEUE_SLOTS - taken
-    status = board.ask(Segments((one, one)))
-    assert (status.free_slots, status.refusal, status.fault) == (1, Result.OK, Fault.NONE)
+    one = Segments(0, 0, 0, (segment_of(20_000, run_of(2)),))
+    two = Segments(0, 0, 0, one.segments * 2)
+    left = fill(board, one)
+    assert encoded_bytes(one) <= left < encoded_bytes(two)
+    status = board.ask(two)
+    assert (status.free_bytes, status.refusal, status.fault) == (left, Result.OK, Fault.NONE)
     board.seq -= 1  # busy: the same number is expected again
     assert board.replies[-1][0] == board.seq
-    assert board.ask(Segments((one,))).free_slots == 0
+    assert board.ask(one).free_bytes == max(0, left - encoded_bytes(one) - QUEUE_FRAME_BYTES)
 
 
 def test_busy_leaves_no_trace_of_the_segments(board: Board) -> None:
@@ -273,19 +287,21 @@ def test_busy_leaves_no_trace_of_the_segments(board: Board) -> None:
     board.get_ready()
     late_end = segment_of(20_001, run_of(1, first=20_000))
     early_end = segment_of(20_000, run_of(1, first=0))
-    for _ in range(QUEUE_SLOTS - 1):
-        board.ask(Segments((early_end,)))
-    board.ask(Segments((late_end, early_end)))
+    left = fill(board, Segments(0, 0, 0, (early_end,)))
+    late = Segments(0, 0, 0, (late_end, early_end))
+    assert encoded_bytes(late) > left
+    board.ask(late)
     board.seq -= 1
-    status = board.ask(Segments((early_end,)))
-    assert (status.fault, status.free_slots) == (Fault.NONE, 0)
+    status = board.ask(Segments(0, 0, 0, (early_end,)))
+    assert (status.fault, status.refusal) == (Fault.NONE, Result.OK)
+    assert status.free_bytes < left
 
 
 def test_hello_in_motion_leaves_the_motion_alone(board: Board) -> None:
     motion = end_motion([segment_of(100_000, run_of(90))] * 3)
     board.get_ready()
     for segment in motion:
-        board.ask(Segments((segment,)))
+        board.ask(Segments(0, 0, 0, (segment,)))
     board.send(Start(LEAD_TICKS))
     board.run(100_000)
     board.hello(nonce=5)
@@ -298,7 +314,7 @@ def test_hello_in_motion_leaves_the_motion_alone(board: Board) -> None:
 
 def test_the_end_of_a_motion_is_told_unasked(board: Board) -> None:
     board.get_ready()
-    board.ask(Segments((segment_of(2 * ANSWER_TICKS, run_of(3), last=True),)))
+    board.ask(Segments(0, 0, 0, (segment_of(2 * ANSWER_TICKS, run_of(3), last=True),)))
     board.ask(Start(LEAD_TICKS))
     board.replies.clear()
     board.run(2 * ANSWER_TICKS)
@@ -309,8 +325,8 @@ def test_the_end_of_a_motion_is_told_unasked(board: Board) -> None:
 
 def test_release_drops_what_was_queued(board: Board) -> None:
     board.get_ready()
-    board.ask(Segments((SHORT,)))
-    assert board.ask(Enable(0)).free_slots == QUEUE_SLOTS
+    board.ask(Segments(0, 0, 0, (SHORT,)))
+    assert board.ask(Enable(0)).free_bytes == room_after()
     board.ask(Enable(1))
     assert board.ask(Start(LEAD_TICKS)).refusal is Result.WRONG_STATE
     board.run(100_000)

@@ -15,11 +15,12 @@ from firmware_board import (
     EmulatedFirmware,
     Schedule,
     end_motion,
+    room_after,
     run_of,
     segment_of,
 )
 from planarm_sim import Uno
-from planarm_wire.codec import decode, encode
+from planarm_wire.codec import decode, encode, encoded_bytes
 from planarm_wire.framing import Frame, FrameDecoder, encode_frame
 from planarm_wire.messages import (
     BAUD,
@@ -27,11 +28,10 @@ from planarm_wire.messages import (
     DIR_PINS,
     ENABLE_PIN,
     HOST_WINDOW_BYTES,
-    MIN_INTERVAL_TICKS,
     MIN_STEP_HIGH_TICKS,
     MIN_STEP_LOW_TICKS,
     PROTOCOL_VERSION,
-    QUEUE_SLOTS,
+    QUEUE_FRAME_BYTES,
     STEP_PINS,
     Fault,
     Hello,
@@ -46,8 +46,9 @@ from planarm_wire.messages import (
 )
 
 IMAGE = Path(__file__).parents[2] / "firmware" / "release" / "uno.hex"
-RESET_TO_PINS_CYCLES = 16  # 1 us
-BOOT_CYCLES = 400_000
+RESET_TO_PINS_CYCLES = 32  # 2 us, with a look at the EEPROM for ENABLE's polarity
+BOOT_CYCLES = 600_000
+LONG_SEGMENTS = 32  # of 63 ms, which the queue holds
 
 
 def boot_nonce(uno: Uno) -> int:
@@ -100,7 +101,7 @@ def test_a_reset_while_the_count_is_written_repeats_no_nonce() -> None:
 def test_reset_in_motion_releases_the_drivers_and_forgets_the_motion(emulated_firmware: EmulatedFirmware) -> None:
     board = Board(emulated_firmware)
     board.get_ready()
-    board.ask(Segments((segment_of(1_000_000, run_of(900)),)))
+    board.ask(Segments(0, 0, 0, (segment_of(1_000_000, run_of(900)),)))
     board.send(Start(LEAD_TICKS))
     board.run(100_000)
     uno = emulated_firmware.uno
@@ -121,7 +122,7 @@ class Streamer:
         self.board = board
         self.waiting = deque(segments)
         self.busy_line = busy_line
-        self.in_flight: deque[tuple[int, int]] = deque()
+        self.in_flight: deque[tuple[int, int, int]] = deque()
         self.last: Status | None = None
         board.replies.clear()
 
@@ -146,22 +147,24 @@ class Streamer:
             self.in_flight.popleft()
 
     def top_up(self) -> None:
-        free = QUEUE_SLOTS if self.last is None else self.last.free_slots
-        queued = sum(1 for _, size in self.in_flight if size > 8)
+        free = room_after() if self.last is None else self.last.free_bytes
+        queued = sum(room for _, _, room in self.in_flight)
         while True:
-            has_slot = self.waiting and queued < free
-            if not has_slot and not self.busy_line and self.in_flight:
+            next_message = Segments(0, 0, 0, (self.waiting[0],)) if self.waiting else None
+            has_room = next_message is not None and queued + encoded_bytes(next_message) <= free
+            if not has_room and not self.busy_line and self.in_flight:
                 return
-            message = Segments((self.waiting[0],)) if has_slot else Query()
+            message = next_message if has_room and next_message is not None else Query()
             frame = encode_frame(self.board.seq, *encode(message))
-            if sum(size for _, size in self.in_flight) + len(frame) > HOST_WINDOW_BYTES:
+            if sum(size for _, size, _ in self.in_flight) + len(frame) > HOST_WINDOW_BYTES:
                 return
-            self.in_flight.append((self.board.seq, len(frame)))
+            room = encoded_bytes(message) + QUEUE_FRAME_BYTES if has_room else 0
+            self.in_flight.append((self.board.seq, len(frame), room))
             self.board.seq = (self.board.seq + 1) % 256
             self.board.receive(frame)
-            if has_slot:
+            if has_room:
                 self.waiting.popleft()
-                queued += 1
+                queued += room
 
 
 def reversing(ratio: float) -> list[Segment]:
@@ -185,9 +188,9 @@ def fast_moves(duration: int, begun_at: Fraction, interval_q16: int) -> tuple[Mo
     return Move(2 * steps + 1, first, interval_q16), first + Fraction(steps * interval_q16, 65536) - duration
 
 
-def fast(ratio: float, duration: int, count: int) -> list[Segment]:
-    """Both joints in one direction, joint 1 at the least interval and joint 2 slower by a ratio, without a pause."""
-    intervals = (MIN_INTERVAL_TICKS << 16, round(MIN_INTERVAL_TICKS * ratio * 65536))
+def fast(interval: int, ratio: float, duration: int, count: int) -> list[Segment]:
+    """Both joints in one direction, joint 1 at an interval and joint 2 slower by a ratio, without a pause."""
+    intervals = (interval << 16, round(interval * ratio * 65536))
     begun_at = [Fraction(0), Fraction(7)]
     segments = []
     for _ in range(count):
@@ -221,7 +224,13 @@ def assert_every_edge(board: Board, motion: list[Segment], status: Status) -> No
 @pytest.mark.parametrize("busy_line", [False, True], ids=["line as needed", "window always full"])
 @pytest.mark.parametrize(
     "motion",
-    [reversing(1.0), reversing(1.618), fast(1.0037, 64_000, 75), fast(1.0, 64_000, 75), fast(1.618, 64_000, 75)],
+    [
+        reversing(1.0),
+        reversing(1.618),
+        fast(320, 1.0037, 64_000, 75),
+        fast(320, 1.0, 64_000, 75),
+        fast(320, 1.618, 64_000, 75),
+    ],
     ids=["20 k, both turn", "20 k and 12.4 k, both turn", "50 k and 49.8 k", "50 k", "50 k and 30.9 k"],
 )
 def test_full_rate_with_both_joints(
@@ -232,7 +241,7 @@ def test_full_rate_with_both_joints(
     board = Board(emulated_firmware)
     board.get_ready()
     for segment in motion[:16]:
-        board.ask(Segments((segment,)))
+        board.ask(Segments(0, 0, 0, (segment,)))
     board.ask(Start(LEAD_TICKS))
     status = Streamer(board, motion[16:], busy_line).run(len(motion), 12_000_000)
     assert (status.ring_full, status.crc_errors) == (0, 0)
@@ -242,14 +251,14 @@ def test_full_rate_with_both_joints(
 def test_two_seconds_at_50_k_on_a_saturated_line(emulated_firmware: EmulatedFirmware) -> None:
     # Both joints at 50,000 steps/s, 1 : 1.0037, while valid frames fill the line without a gap, whatever the window.
     # The frames repeat a number, so each is answered by STATUS and none queues anything; many find the ring full.
-    motion = end_motion(fast(1.0037, 1_004_000, QUEUE_SLOTS))
+    motion = end_motion(fast(320, 1.0037, 1_004_000, LONG_SEGMENTS))
     board = Board(emulated_firmware)
     board.get_ready()
     for segment in motion:
-        board.ask(Segments((segment,)))
+        board.ask(Segments(0, 0, 0, (segment,)))
     board.ask(Start(LEAD_TICKS))
-    frame = encode_frame(board.seq - 1, *encode(Segments((motion[0],))))
-    end = board.now + LEAD_TICKS + 1_004_000 * QUEUE_SLOTS + 100_000
+    frame = encode_frame(board.seq - 1, *encode(Segments(0, 0, 0, (motion[0],))))
+    end = board.now + LEAD_TICKS + 1_004_000 * LONG_SEGMENTS + 100_000
     serial = emulated_firmware.uno.serial
     while board.now < end:
         while serial.pending < HOST_WINDOW_BYTES:
@@ -267,7 +276,7 @@ def test_more_bytes_than_the_ring_holds_are_counted_and_harmless(emulated_firmwa
     motion = end_motion([segment_of(800_000, run_of(999, interval=800), run_of(999, interval=800))])
     board = Board(emulated_firmware)
     board.get_ready()
-    board.ask(Segments(tuple(motion)))
+    board.ask(Segments(0, 0, 0, tuple(motion)))
     board.ask(Start(LEAD_TICKS))
     board.receive(bytes(range(256)) * 4)
     board.run(1_200_000)

@@ -17,8 +17,8 @@ def frame_of(arq: GoBackN, payload: bytes = b"") -> bytes:
     return encode_frame(arq.next_seq, Query.TYPE, payload)
 
 
-def send(arq: GoBackN, now_s: float = 0.0, payload: bytes = b"", slots: int = 0) -> bytes:
-    return arq.send(frame_of(arq, payload), slots, now_s)
+def send(arq: GoBackN, now_s: float = 0.0, payload: bytes = b"", room: int = 0) -> bytes:
+    return arq.send(frame_of(arq, payload), room, now_s)
 
 
 class Receiver:
@@ -64,7 +64,7 @@ def test_everything_arrives_once_and_in_order_within_the_window(payloads, first_
             pass_on(again)
         pass_on(arq.on_time(now_s))
     assert receiver.carried_out == payloads
-    assert arq.bytes_in_flight == arq.slots_in_flight == 0
+    assert arq.bytes_in_flight == arq.room_in_flight == 0
     assert arq.counters.frames_sent == len(payloads)
 
 
@@ -118,13 +118,13 @@ def test_a_repeated_acknowledgement_with_nothing_in_flight_means_nothing():
 
 def test_busy_is_asked_again_at_the_time_out_only():
     arq = GoBackN(0)
-    frame = send(arq, 0.0, b"segments", slots=3)
-    assert arq.slots_in_flight == 3
+    frame = send(arq, 0.0, b"segments", room=3)
+    assert arq.room_in_flight == 3
     assert arq.on_ack(0, 2, 0.01) == (Ack.REPEATED, b"")
     assert arq.counters.busy_replies == 1
     assert arq.on_time(INITIAL_TIMEOUT_S) == bytes([DELIMITER]) + frame
     assert arq.on_ack(1, 0, 0.06)[0] is Ack.ADVANCED
-    assert arq.slots_in_flight == 0
+    assert arq.room_in_flight == 0
 
 
 @pytest.mark.parametrize("ack", [9, 13, 200])

@@ -17,6 +17,7 @@ from planarm_wire.messages import (
     Ledger,
     MessageType,
     Query,
+    Reset,
     Result,
     State,
     Status,
@@ -33,6 +34,9 @@ def welcome(**changed) -> Welcome:
         "boot_nonce": 0xB0070001,
         "spec_hash": SPEC_HASH,
         "firmware_version": (1, 2, 3),
+        "reset_cause": Reset.EXTERNAL,
+        "interrupted": 0,
+        "joints": 2,
         "ledger": Ledger(5, (100, -7)),
     }
     return Welcome(**values | changed)
@@ -44,7 +48,12 @@ def status(**changed) -> Status:
         "fault": Fault.NONE,
         "refusal": Result.OK,
         "refusal_seq": 0,
-        "free_slots": 32,
+        "detail": 0,
+        "free_bytes": 895,
+        "holds": 0,
+        "inputs": 0,
+        "override_percent": 100,
+        "rate_percent": 100,
         "crc_errors": 0,
         "overruns": 0,
         "ring_full": 0,
@@ -112,7 +121,7 @@ def test_an_old_welcome_noise_and_an_old_status_do_not_open():
 def test_another_protocol_version_says_what_to_flash():
     payload = bytes([PROTOCOL_VERSION + 1]) + encode(welcome())[1][1:] + b"more"
     session = Session(NONCE, 0.0)
-    with pytest.raises(LinkError, match=r"speaks protocol version 2, this host speaks version 1; flash the released"):
+    with pytest.raises(LinkError, match=r"speaks protocol version 3, this host speaks version 2; flash the released"):
         session.receive(encode_frame(1, MessageType.WELCOME, payload), 0.01)
 
 

@@ -1,6 +1,7 @@
 """Streaming against a model of the device, on good lines and bad ones, in virtual time."""
 
 from dataclasses import replace
+from itertools import accumulate
 
 import pytest
 from hypothesis import given, settings
@@ -12,10 +13,12 @@ from planarm.link.exchange import open_session, request, stream_plan
 from planarm.link.position import Certainty, StreamError, StreamFault
 from planarm.link.session import SessionLimits
 from planarm.link.stream import StreamOptions, planned_usteps
+from planarm_wire.codec import decode, encoded_bytes
 from planarm_wire.framing import Frame, FrameDecoder, encode_frame
 from planarm_wire.messages import (
     HOST_WINDOW_BYTES,
-    QUEUE_SLOTS,
+    QUEUE_BYTES,
+    QUEUE_FRAME_BYTES,
     TICKS_HZ,
     Enable,
     Fault,
@@ -26,6 +29,7 @@ from planarm_wire.messages import (
     Start,
     State,
 )
+from planarm_wire.rates import Allowance, head_of
 from planarm_wire.steps import duration_ticks
 
 HARMLESS = Damage()
@@ -79,7 +83,7 @@ def test_the_queue_is_full_before_the_start_and_stays_nearly_full():
     result = stream_plan(line, plan)
     kinds = [frame.type_code for frame in frames_written(line)]
     before_start = [f for f in frames_written(line)[: kinds.index(MessageType.START)] if f.type_code == Segments.TYPE]
-    assert len(before_start) >= QUEUE_SLOTS // 4
+    assert sum(len(f.payload) + QUEUE_FRAME_BYTES for f in before_start) > 0.9 * QUEUE_BYTES
     assert result.least_queued >= 24
 
 
@@ -103,7 +107,7 @@ def test_progress_counts_up_to_the_end():
     assert seen[-1].executed_segments == seen[-1].total_segments == 120
     assert seen[-1].path_s == seen[-1].total_s == pytest.approx(0.24)
     assert seen[-1].moved_usteps == planned_usteps(plan)
-    assert max(p.queued_segments for p in seen) > QUEUE_SLOTS - 4
+    assert max(p.queued_segments for p in seen) > 30
 
 
 def test_a_long_segment_keeps_progress_alive_without_filling_the_line():
@@ -120,7 +124,7 @@ def test_segments_left_by_an_earlier_session_are_dropped_first():
     line, plan = ModelLine(), motion(20)
     session = open_session(line)
     request(line, session, Enable(1))
-    request(line, session, Segments(motion(2, seed=9)[:1]))
+    request(line, session, Segments(0, 0, 0, motion(2, seed=9)[:1]))
     stream_plan(line, plan)
     assert tuple(line.device.segments_executed) == plan
 
@@ -137,7 +141,7 @@ def test_a_motion_under_way_is_not_disturbed():
     session = open_session(line)
     request(line, session, Enable(1))
     for segment in first:
-        request(line, session, Segments((segment,)))
+        request(line, session, Segments(0, 0, 0, (segment,)))
     request(line, session, Start(16_000))
     with pytest.raises(LinkError, match="executing the motion of an earlier session; wait"):
         stream_plan(line, motion(3))
@@ -208,13 +212,16 @@ def test_a_slow_device_never_overflows_its_ring():
 
 def test_a_device_without_room_is_asked_again_until_it_has():
     """Busy leaves the expected number where it is, so the frame comes again and is carried out once."""
-    line, crowd = ModelLine(), motion(QUEUE_SLOTS + 1, ticks=1_600_000)
+    line, crowd = ModelLine(), motion(80, ticks=1_600_000)
+    room = [encoded_bytes(Segments(0, 0, 0, (segment,))) + QUEUE_FRAME_BYTES for segment in crowd]
+    fitting = sum(total <= QUEUE_BYTES for total in accumulate(room))
+    crowd = crowd[: fitting + 1]
     session = open_session(line)
     request(line, session, Enable(1))
-    for segment in crowd[:QUEUE_SLOTS]:
-        request(line, session, Segments((segment,)))
+    for segment in crowd[:-1]:
+        request(line, session, Segments(0, 0, 0, (segment,)))
     request(line, session, Start(16_000))
-    request(line, session, Segments((crowd[-1],)))
+    request(line, session, Segments(0, 0, 0, (crowd[-1],)))
     assert line.now_s() > 0.1  # the first segment had to end
     assert session.arq_counters.busy_replies > 0
     line.wait_until(10.0)
@@ -250,20 +257,51 @@ def test_a_restarted_device_that_somebody_enabled_again_is_still_another_boot():
     assert caught.value.position.certainty is Certainty.LOST
 
 
-def test_the_keyboard_stops_the_sending_and_the_position_is_exact():
-    """Nothing more is sent; the device runs what it has, and the host waits for that and tells what was executed."""
+def test_the_keyboard_holds_first_and_stops_second():
     line, plan = ModelLine(), motion(300)
+    pressed, held = [], []
 
-    def stop_early(told):
-        if told.executed_segments >= 40:
+    def press(told):
+        if told.executed_segments >= 40 and not pressed:
+            pressed.append(line.now_s())
             raise KeyboardInterrupt
+        if told.state is State.HELD:
+            held.append(line.now_s())
+            if len(held) == 20:
+                raise KeyboardInterrupt
 
     with pytest.raises(StreamError, match=r"stopped by the keyboard.*position exact") as stopped:
-        stream_plan(line, plan, stop_early)
+        stream_plan(line, plan, press)
     executed = line.device.segments_executed
     assert 40 <= len(executed) < len(plan)
     assert list(executed) == list(plan[: len(executed)])
+    assert line.device.holds == 1
+    assert held[-1] - held[0] > 0.05, "held, it waits"
     assert stopped.value.position.executed_segments == (len(executed), len(executed))
+    assert stopped.value.position.moved_usteps == tuple(line.device.position)
+
+
+def test_a_hold_that_nobody_asked_for_is_taken_back():
+    line, plan = ModelLine(), motion(300)
+    after(line, 0.2, line.device.hold)
+    result = stream_plan(line, plan)
+    assert line.device.holds == 1
+    assert tuple(line.device.segments_executed) == plan
+    assert result.segments == 300
+
+
+def test_messages_carry_the_least_allowances_of_their_segments():
+    line, plan = ModelLine(), motion(60)
+    allowances = tuple(Allowance(2.0 + k % 7, 1.0 + k % 5, 32_768.0 * (k % 9)) for k in range(60))
+    stream_plan(line, plan, options=StreamOptions(allowances=allowances, start_stop_ticks=(40_000, 50_000)))
+    assert [config.start_stop_ticks for config in line.device.configs] == [(40_000, 50_000)]
+    sent = [decode(f.type_code, f.payload) for f in frames_written(line) if f.type_code == MessageType.SEGMENTS]
+    at = 0
+    for message in sent:
+        part = allowances[at : at + len(message.segments)]
+        assert (message.slow, message.fast, message.need) == head_of(part)
+        at += len(message.segments)
+    assert at == 60
 
 
 def test_the_keyboard_before_the_motion_is_just_that():
@@ -284,7 +322,7 @@ def test_a_cut_line_bounds_the_position():
         stream_plan(line, plan)
     fewest, most = caught.value.position.executed_segments
     assert fewest <= len(line.device.segments_executed) <= most
-    assert most - fewest <= QUEUE_SLOTS + 4
+    assert most - fewest <= 45
 
 
 def test_a_line_that_comes_back_after_an_underrun_gives_the_exact_position():
@@ -344,7 +382,7 @@ def test_a_line_that_cannot_carry_the_plan_ends_in_an_underrun_with_the_exact_po
 
 
 def test_another_version_or_specification_is_refused_before_anything_is_sent():
-    for changed in ({"protocol_version": 2}, {"spec_hash": 1}):
+    for changed in ({"protocol_version": 1}, {"spec_hash": 1}):
         line = ModelLine()
         for name, value in changed.items():
             setattr(line.device, name, value)
@@ -385,7 +423,7 @@ def test_a_device_that_stops_early_without_a_fault_is_told():
 
 def test_a_device_that_never_executes_is_told():
     line = ModelLine()
-    after(line, 0.1, lambda: setattr(line.device, "_end_segment", lambda: None))
+    after(line, 0.1, lambda: setattr(line.device, "_end_segment", lambda _end_s: None))
     with pytest.raises(StreamError, match=r"executes nothing: segment \d+ of 300 has not ended"):
         stream_plan(line, motion(300))
 

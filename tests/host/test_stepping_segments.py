@@ -56,7 +56,7 @@ def check_everything(train, coding=WITHOUT_FAST_MOTORS):
         duration = segment.duration_flags >> 1
         assert 0 < duration <= MAX_SEGMENT_TICKS
         assert bool(segment.duration_flags & 1) == (k == len(plan.segments) - 1)
-        assert decode(*encode(Segments((segment,)))).segments == (segment,)
+        assert decode(*encode(Segments(0, 0, 0, (segment,)))).segments == (segment,)
         for j, (move, relative) in enumerate(zip(segment.moves, expand_moves(segment), strict=True)):
             count, sign = move.steps_dir >> 1, 1 if move.steps_dir & 1 else -1
             assert count == len(relative) <= MAX_SEGMENT_STEPS

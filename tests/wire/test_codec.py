@@ -72,6 +72,7 @@ def test_a_payload_cut_short_or_too_long_is_refused(message: m.Message, data: st
     assume(cut < len(payload))
     if type_code == m.MessageType.SEGMENTS:
         # A cut between two segments leaves a shorter message, any other none; never the same one.
+        assert isinstance(message, m.Segments)
         try:
             left = decode(type_code, payload[:cut]).segments
         except WireError:
@@ -96,17 +97,23 @@ def test_any_payload_is_refused_or_is_the_one_form_of_its_message(type_code: int
 def test_known_bytes() -> None:
     # LEB128 and zigzag by hand: 300 = 0xAC 0x02; -3 zigzags to 5; 2^32 - 1 is FF FF FF FF 0F.
     segment = m.Segment(300, (m.Move(5, 1, 2**32 - 1, -3), m.Move(1)))
-    assert encode(m.Segments((segment,))) == (0x04, bytes.fromhex("ac02 05 01 ffffffff0f 05 01"))
+    assert encode(m.Segments(0, 0, 0, (segment,))) == (0x04, bytes.fromhex("000000 ac02 05 01 ffffffff0f 05 01"))
     assert encode(m.Enable(1)) == (0x03, b"\x01")
     assert encode(m.Query()) == (0x02, b"")
-    status = m.Status(m.State.FAULT, m.Fault.UNDERRUN, m.Result.VERSION, 1, 2, 3, 4, 5, 6, m.Ledger(7, (-1, 8)))
-    assert encode(status)[1].hex(" ") == "03 02 fb 01 02 03 04 05 06 00 00 00 07 00 00 00 ff ff ff ff 08 00 00 00"
+    status = m.Status(
+        m.State.FAULT, m.Fault.UNDERRUN, 1, m.Result.VERSION, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, m.Ledger(12, (-1, 8))
+    )
+    assert encode(status)[1].hex(" ") == (
+        "03 02 01 fb 02 03 00 04 05 06 07 08 09 0a 0b 00 00 00 0c 00 00 00 ff ff ff ff 08 00 00 00"
+    )
 
 
 def test_numpys_integers_are_whole_numbers() -> None:
     move = m.Move(np.int64(5), np.uint32(10), np.int64(900 << 16), np.int64(-4))
     plain = m.Move(5, 10, 900 << 16, -4)
-    assert encode(m.Segments((m.Segment(20, (move, move)),))) == encode(m.Segments((m.Segment(20, (plain, plain)),)))
+    assert encode(m.Segments(0, 0, 0, (m.Segment(20, (move, move)),))) == encode(
+        m.Segments(0, 0, 0, (m.Segment(20, (plain, plain)),))
+    )
 
 
 REST = m.Move(0)
@@ -116,25 +123,28 @@ REFUSED: dict[str, tuple[Any, str]] = {
     "negative number": (m.Hello(-1, 0), "hello.protocol_version: -1 is outside 0 .. 255 (u8)"),
     "no whole number": (m.Start(1.5), "start.lead_ticks: is 1.5, not a whole number"),
     "too few entries": (
-        m.Segments((m.Segment(2, (REST,)),)),
+        m.Segments(0, 0, 0, (m.Segment(2, (REST,)),)),
         "segments.segments[0].moves: has 1 entries, needs 2",
     ),
-    "no entry": (m.Segments(()), "segments.segments: is empty, needs one entry or more"),
-    "not the struct": (m.Segments((m.Segment(2, (REST, 5)),)), "segments.segments[0].moves[1]: is 5, not a Move"),
+    "no entry": (m.Segments(0, 0, 0, ()), "segments.segments: is empty, needs one entry or more"),
+    "not the struct": (
+        m.Segments(0, 0, 0, (m.Segment(2, (REST, 5)),)),
+        "segments.segments[0].moves[1]: is 5, not a Move",
+    ),
     "deep inside": (
-        m.Segments((m.Segment(2, (REST, REST)), m.Segment(2, (REST, m.Move(4, 0, 0, 2**31))))),
+        m.Segments(0, 0, 0, (m.Segment(2, (REST, REST)), m.Segment(2, (REST, m.Move(4, 0, 0, 2**31))))),
         "segments.segments[1].moves[1].add_q16: 2147483648 is outside -2147483648 .. 2147483647 (varint)",
     ),
     "absent field is not 0": (
-        m.Segments((m.Segment(2, (m.Move(2, 0, 1), REST)),)),
+        m.Segments(0, 0, 0, (m.Segment(2, (m.Move(2, 0, 1), REST)),)),
         "segments.segments[0].moves[0].interval_q16: is 1, but must be 0 while steps_dir >= 4 does not hold",
     ),
     "unknown code": (
-        m.Status(9, m.Fault.NONE, m.Result.OK, 0, 0, 0, 0, 0, 0, LEDGER),
-        "status.state: 9 is no State (known: 0 IDLE, 1 READY, 2 RUNNING, 3 FAULT)",
+        m.Status(99, m.Fault.NONE, 0, m.Result.OK, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, LEDGER),
+        "status.state: 99 is no State (known: 0 IDLE, 1 READY, 2 RUNNING, 3 FAULT, ",
     ),
     "payload too long": (
-        m.Segments((m.Segment(2, (REST, REST)),) * 17),
+        m.Segments(0, 0, 0, (m.Segment(2, (REST, REST)),) * 16),
         "segments: the payload has 51 bytes, over MAX_PAYLOAD_BYTES = 48; put fewer segments into one message",
     ),
 }
@@ -151,13 +161,34 @@ UNREADABLE = {
     "unknown type": (0x55, "", "message type 0x55 is unknown"),
     "left over": (0x02, "00", "query: 1 bytes are left over after the last field"),
     "too short": (0x05, "0102", "start.lead_ticks: the payload ends 2 bytes short of this u32"),
-    "no segment": (0x04, "", "segments.segments: is empty"),
-    "overlong": (0x04, "8000 00 00", "segments.segments[0].duration_flags: the number is written in more bytes than"),
-    "over 32 bits": (0x04, "ffffffff10 00 00", "segments.segments[0].duration_flags: 4563402751 is over 32 bits"),
-    "six bytes": (0x04, "ffffffffff00 00 00", "segments.segments[0].duration_flags: the number goes on after 5 bytes"),
-    "ends inside a number": (0x04, "80", "segments.segments[0].duration_flags: the payload ends inside this number"),
-    "ends inside a move": (0x04, "02 00 02", "segments.segments[0].moves[1].first_ticks: the payload ends inside this"),
-    "unknown code": (0x82, "00 09" + "00" * 22, "status.fault: 9 is no Fault (known: 0 NONE, "),
+    "no segment": (0x04, "000000", "segments.segments: is empty"),
+    "no head": (0x04, "00", "segments.fast: the payload ends 1 bytes short of this u8"),
+    "overlong": (
+        0x04,
+        "000000 8000 00 00",
+        "segments.segments[0].duration_flags: the number is written in more bytes than",
+    ),
+    "over 32 bits": (
+        0x04,
+        "000000 ffffffff10 00 00",
+        "segments.segments[0].duration_flags: 4563402751 is over 32 bits",
+    ),
+    "six bytes": (
+        0x04,
+        "000000 ffffffffff00 00 00",
+        "segments.segments[0].duration_flags: the number goes on after 5 bytes",
+    ),
+    "ends inside a number": (
+        0x04,
+        "000000 80",
+        "segments.segments[0].duration_flags: the payload ends inside this number",
+    ),
+    "ends inside a move": (
+        0x04,
+        "000000 02 00 02",
+        "segments.segments[0].moves[1].first_ticks: the payload ends inside this",
+    ),
+    "unknown code": (0x82, "00 63" + "00" * 29, "status.fault: 99 is no Fault (known: 0 NONE, "),
     "over the limit": (0x04, "00" * 49, "segments: a payload of 49 bytes is over MAX_PAYLOAD_BYTES = 48"),
 }
 

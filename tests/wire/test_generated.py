@@ -109,7 +109,14 @@ def header_program() -> str:
     for joint, (step, direction) in enumerate(zip(messages.STEP_PINS, messages.DIR_PINS, strict=True)):
         check(f"STEP_PINS[{joint}]", int(step[1:]))
         check(f"DIR_PINS[{joint}]", int(direction[1:]))
-    for enum in (messages.MessageType, messages.State, messages.Fault, messages.Result):
+    for enum in (
+        messages.MessageType,
+        messages.State,
+        messages.Fault,
+        messages.Reset,
+        messages.PinMap,
+        messages.Result,
+    ):
         for member in enum:
             check(f"static_cast<int>({enum.__name__}::{member.name})", member.value)
         check(f"sizeof({enum.__name__})", 1)
@@ -117,12 +124,12 @@ def header_program() -> str:
         f'static_assert({enum}(-1) {sign}, "{enum}");' for enum, sign in (("int8_t", "< 0"), ("uint8_t", "> 0"))
     )
     # Where a field starts, found by changing it alone and looking which payload byte changes first.
-    zero = decode(0x82, bytes(24))
+    zero = decode(0x82, bytes(30))
     changes = {
         "STATE": {"state": messages.State.READY},
         "FAULT": {"fault": messages.Fault.UNDERRUN},
         "REFUSAL": {"refusal": messages.Result.VERSION},
-        "FREE_SLOTS": {"free_slots": 1},
+        "FREE_BYTES": {"free_bytes": 1},
         "RING_FULL": {"ring_full": 1},
         "MCU_TICKS": {"mcu_ticks": 1},
         "LEDGER_EXECUTED_SEGMENTS": {"ledger": messages.Ledger(1, (0, 0))},
@@ -131,8 +138,8 @@ def header_program() -> str:
     for name, change in changes.items():
         _, payload = encode(messages.Status(**{f: getattr(zero, f) for f in zero.__slots__} | change))
         check(f"status_at::{name}", next(at for at, byte in enumerate(payload) if byte))
-    check("STATUS_BYTES", 24)
-    check("WELCOME_BYTES", len(encode(decode(0x81, bytes(28)))[1]))
+    check("STATUS_BYTES", 30)
+    check("WELCOME_BYTES", len(encode(decode(0x81, bytes(31)))[1]))
     return "\n".join((*lines, "int main() { return 0; }"))
 
 
@@ -167,7 +174,7 @@ def test_vectors_hold_every_message_and_every_verdict() -> None:
 @pytest.mark.parametrize("vector", VECTORS["frames"], ids=lambda v: f"{v['message']}-{v['seq']}")
 def test_vector_of_a_frame(vector: dict) -> None:
     message = decode(vector["type"], bytes.fromhex(vector["payload"]))
-    assert type(message).__name__.lower() == vector["message"]
+    assert message.TYPE.name.lower() == vector["message"]
     assert json.loads(json.dumps(_plain(message))) == vector["fields"]
     assert encode_frame(vector["seq"], *encode(message)).hex() == vector["line"]
 

@@ -34,15 +34,15 @@ MISTAKES = {
     ),
     "unknown section": ("[protocol]", "[extras]\nx = 1\n[protocol]", "top level: unknown key 'extras'"),
     "missing section": ("[sequence]\n", "[limits.sequence]\nvalue = 1\n", "sequence is missing"),
-    "missing key": ("version = 1\n", "", "protocol: version is missing"),
+    "missing key": ("version = 2\n", "", "protocol: version is missing"),
     "missing doc of a limit": (', doc = "Timer1 and path clock, prescaler 1"', "", "limits.ticks_hz: doc is missing"),
     "missing doc of a field": (', doc = "1 or 0"', "", "messages.enable.fields[0]: doc is missing"),
     "empty doc": ('doc = "Asks for STATUS."', 'doc = " "', "messages.query.doc: empty"),
     "missing fix": (', fix = "wait until the motion is done"', "", "faults.queue_misuse: fix is missing"),
     "empty fix": ('fix = "wait until the motion is done"', 'fix = ""', "faults.queue_misuse.fix: empty"),
-    "wrong type": ("version = 1\n", 'version = "1"\n', "protocol.version: '1' is not of type int"),
-    "truth for a number": ("version = 1\n", "version = true\n", "protocol.version: True is not of type int"),
-    "version": ("version = 1\n", "version = 256\n", "protocol.version: 256 is outside 1 .. 255"),
+    "wrong type": ("version = 2\n", 'version = "1"\n', "protocol.version: '1' is not of type int"),
+    "truth for a number": ("version = 2\n", "version = true\n", "protocol.version: True is not of type int"),
+    "version": ("version = 2\n", "version = 256\n", "protocol.version: 256 is outside 1 .. 255"),
     "delimiter": ("delimiter = 0x7E", "delimiter = 0x17E", "framing.delimiter: 382 is outside 1 .. 255"),
     "same special byte twice": (
         "escape = 0x7D",
@@ -115,7 +115,7 @@ MISTAKES = {
     "payload too long": (
         "repeat = 3",
         "repeat = 30",
-        "messages.welcome: up to 55 bytes, over framing.max_payload_bytes",
+        "messages.welcome: up to 58 bytes, over framing.max_payload_bytes",
     ),
     "not a table": (
         'idle = { code = 0, doc = "drivers released',
@@ -142,7 +142,7 @@ def test_wording_leaves_the_hash_as_it_is_and_everything_else_changes_it() -> No
     ):
         assert parse_spec(changed(old, new)).spec_hash == before
     for old, new in (
-        ("version = 1\n", "version = 2\n"),
+        ("version = 2\n", "version = 3\n"),
         ('unit = "ticks"', 'unit = "us"'),
         ("value = 320", "value = 321"),
         ("initial 0xFFFF", "initial 0x0000"),

@@ -3,11 +3,14 @@
 #include <deque>
 
 #include "firmware.h"
+#include "hal_journal.h"
 #include "hal_pins.h"
 #include "hal_serial.h"
+#include "hal_signals.h"
 #include "hal_step_timer.h"
 #include "messages.h"
 #include "step_engine.h"
+#include "supervisor.h"
 
 namespace hal {
 namespace board {
@@ -25,6 +28,8 @@ struct Channel {
     bool high;
     bool matched;  // the flag that asks for the interrupt
     bool interrupt_on;
+    uint8_t steps_left;
+    uint16_t fraction;
 };
 
 struct Board {
@@ -40,6 +45,13 @@ struct Board {
     std::deque<uint8_t> sent;
     uint64_t sending_until;
     uint8_t ring_full;
+    uint8_t holds;
+    uint8_t emergency_run;
+    Emergency emergency;
+    uint8_t inputs;
+    bool stop_watched;
+    bool enable_active_high;
+    bool was_enabled;  // the journal; like the next one it outlives a reset
 };
 
 Board uno;
@@ -57,7 +69,7 @@ uint64_t next_match(const Channel& channel) {
 void match(uint8_t joint) {
     Channel& channel = uno.channels[joint];
     channel.matched = true;
-    set_pin(channel.high, channel.armed, wire::STEP_PINS[joint]);
+    set_pin(channel.high, channel.armed && !channel.high, wire::STEP_PINS[joint]);
 }
 
 template <uint8_t JOINT>
@@ -124,7 +136,18 @@ void set_edge(uint8_t joint, uint16_t tick) { uno.channels[joint].edge = tick; }
 
 void arm(uint8_t joint, bool armed) { uno.channels[joint].armed = armed; }
 
-void fall(uint8_t joint) { set_pin(uno.channels[joint].high, false, wire::STEP_PINS[joint]); }
+void fall(uint8_t joint) {
+    Channel& channel = uno.channels[joint];
+    set_pin(channel.high, channel.armed && !channel.high, wire::STEP_PINS[joint]);
+}
+
+uint8_t steps_left(uint8_t joint) { return uno.channels[joint].steps_left; }
+
+void set_steps_left(uint8_t joint, uint8_t steps) { uno.channels[joint].steps_left = steps; }
+
+uint16_t fraction(uint8_t joint) { return uno.channels[joint].fraction; }
+
+void set_fraction(uint8_t joint, uint16_t fraction) { uno.channels[joint].fraction = fraction; }
 
 bool is_high(uint8_t joint) { return uno.channels[joint].high; }
 
@@ -142,7 +165,30 @@ void write_dir(uint8_t joint, bool positive) { set_pin(uno.dirs[joint], positive
 
 using board::uno;
 
-void drivers_enable(bool on) { board::set_pin(uno.enable_high, !on, planarm::wire::ENABLE_PIN); }
+void set_enable_active_high(bool active_high) { uno.enable_active_high = active_high; }
+
+void drivers_enable(bool on) {
+    board::set_pin(uno.enable_high, on == uno.enable_active_high, planarm::wire::ENABLE_PIN);
+}
+
+uint8_t inputs() { return uno.inputs; }
+
+void watch_stop_input(bool on) { uno.stop_watched = on; }
+
+void journal_mark(bool enabled) { uno.was_enabled = enabled; }
+
+void journal_serve() {}
+
+uint8_t hold_count() { return uno.holds; }
+
+Emergency emergency() { return uno.emergency; }
+
+void emergency_clear() {
+    uno.emergency_run = 0;
+    uno.emergency = Emergency::NONE;
+}
+
+void watchdog_feed() {}
 
 bool serial_read(uint8_t& byte) {
     if (uno.received.empty()) return false;
@@ -180,22 +226,52 @@ size_t take(std::deque<Item>& from, Item* to, size_t most) {
 
 using hal::board::uno;
 
+namespace {
+
+void end_pulses(hal::Emergency cause) {
+    hal::steps_off();
+    hal::step_fall<0>();
+    hal::step_fall<1>();
+    uno.emergency = cause;
+}
+
+// What the receive interrupt does with a byte.
+void receive_byte(uint8_t byte) {
+    namespace wire = planarm::wire;
+    if (byte == wire::EMERGENCY_CODE) {
+        if (++uno.emergency_run >= wire::EMERGENCY_REPEATS) end_pulses(hal::Emergency::LINE);
+        return;
+    }
+    uno.emergency_run = 0;
+    if (byte == wire::HOLD_CODE) {
+        ++uno.holds;
+    } else if (uno.received.size() == wire::RX_RING_BYTES) {
+        ++uno.ring_full;
+    } else {
+        uno.received.push_back(byte);
+    }
+}
+
+}  // namespace
+
 void planarm_power_on(uint32_t boot_count, uint64_t tick, planarm_delays delays) {
+    const bool was_enabled = uno.was_enabled;
     uno = hal::board::Board();
     uno.now = tick;
     uno.delays = delays;
     uno.enable_high = true;
-    planarm::firmware::set_up(boot_count, static_cast<uint32_t>(tick));
+    planarm::firmware::set_up({boot_count, planarm::wire::Reset::POWER_ON, was_enabled},
+                              static_cast<uint32_t>(tick));
 }
 
 void planarm_receive(const uint8_t* bytes, size_t count) {
-    for (size_t i = 0; i < count; ++i) {
-        if (uno.received.size() == planarm::wire::RX_RING_BYTES) {
-            ++uno.ring_full;
-        } else {
-            uno.received.push_back(bytes[i]);
-        }
-    }
+    for (size_t i = 0; i < count; ++i) receive_byte(bytes[i]);
+}
+
+void planarm_set_inputs(uint8_t inputs) {
+    const bool opens = (inputs & ~uno.inputs & hal::STOP_INPUT_OPEN) != 0;
+    uno.inputs = inputs;
+    if (opens && uno.stop_watched) end_pulses(hal::Emergency::INPUT);
 }
 
 void planarm_run(uint64_t ticks) {
@@ -208,6 +284,20 @@ void planarm_run(uint64_t ticks) {
             hal::board::serve_interrupts();
         }
     }
+}
+
+uint8_t planarm_signal(uint8_t event) {
+    namespace supervisor = planarm::supervisor;
+    const supervisor::Event told = static_cast<supervisor::Event>(event);
+    const bool allowed = supervisor::allows(told);
+    supervisor::apply(told, static_cast<uint32_t>(uno.now));
+    return allowed ? 1 : 0;
+}
+
+uint8_t planarm_state() { return static_cast<uint8_t>(planarm::supervisor::state()); }
+
+void planarm_latch(uint8_t fault) {
+    planarm::supervisor::fail(static_cast<planarm::wire::Fault>(fault), 0, static_cast<uint32_t>(uno.now));
 }
 
 uint64_t planarm_now() { return uno.now; }

@@ -30,6 +30,15 @@ void planarm_power_on(uint32_t boot_count, uint64_t tick, planarm_delays delays)
 // Brings bytes to the receive ring at once; what does not fit is lost and counted.
 void planarm_receive(const uint8_t* bytes, size_t count);
 
+// Sets the inputs, as hal::inputs tells them.
+void planarm_set_inputs(uint8_t inputs);
+
+// The supervisor alone: whether its table has a row for the event, which is then carried out; its state; a
+// fault.
+uint8_t planarm_signal(uint8_t event);
+uint8_t planarm_state();
+void planarm_latch(uint8_t fault);
+
 // Runs the firmware until `ticks` more have passed.
 void planarm_run(uint64_t ticks);
 

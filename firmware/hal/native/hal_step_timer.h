@@ -15,8 +15,12 @@ void unlock();
 uint16_t counter();
 uint16_t edge(uint8_t joint);
 void set_edge(uint8_t joint, uint16_t tick);
-void arm(uint8_t joint, bool armed);
+void arm(uint8_t joint, bool armed);  // the match toggles the pin, else it takes it low
 void fall(uint8_t joint);
+uint8_t steps_left(uint8_t joint);
+void set_steps_left(uint8_t joint, uint8_t steps);
+uint16_t fraction(uint8_t joint);
+void set_fraction(uint8_t joint, uint16_t fraction);
 bool is_high(uint8_t joint);
 void forget_match(uint8_t joint);
 void enable_interrupt(uint8_t joint, bool on);
@@ -55,9 +59,42 @@ void step_arm() {
 }
 
 template <uint8_t JOINT>
-void step_fall() {
+void step_disarm() {
     board::arm(JOINT, false);
+}
+
+template <uint8_t JOINT>
+void step_fall() {
     board::fall(JOINT);
+}
+
+template <uint8_t JOINT>
+uint8_t steps_left() {
+    return board::steps_left(JOINT);
+}
+
+template <uint8_t JOINT>
+void set_steps_left(uint8_t steps) {
+    board::set_steps_left(JOINT, steps);
+}
+
+template <uint8_t JOINT>
+uint16_t step_fraction() {
+    return board::fraction(JOINT);
+}
+
+template <uint8_t JOINT>
+void set_step_fraction(uint16_t fraction) {
+    board::set_fraction(JOINT, fraction);
+}
+
+template <uint8_t JOINT>
+constexpr uint8_t step_interrupt_mask() {
+    return 1 << JOINT;
+}
+
+inline uint8_t step_interrupts_on() {
+    return static_cast<uint8_t>((board::interrupt_is_on(0) ? 1 : 0) | (board::interrupt_is_on(1) ? 2 : 0));
 }
 
 template <uint8_t JOINT>
@@ -92,7 +129,7 @@ inline void steps_off() {
     }
 }
 
-inline void wait_step_high() { board::elapse(33); }
+inline void wait_step_high() { board::elapse(57); }
 
 template <uint8_t JOINT>
 bool dir_is(bool positive) {

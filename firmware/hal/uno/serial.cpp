@@ -1,7 +1,9 @@
 #include <avr/interrupt.h>
 #include <avr/io.h>
 
+#include "framing.h"
 #include "hal_serial.h"
+#include "hal_signals.h"
 #include "messages.h"
 
 namespace hal {
@@ -16,11 +18,19 @@ constexpr uint32_t BAUD_DIVIDER = TICKS_HZ / (8 * BAUD);  // double speed, ATmeg
 static_assert(BAUD_DIVIDER * 8 * BAUD == TICKS_HZ, "the baud rate must be exact");
 static_assert((RX_RING_BYTES & (RX_RING_BYTES - 1)) == 0, "ring indices wrap by a mask");
 
-volatile uint8_t ring[RX_RING_BYTES];  // written by the interrupt, like all but ring_tail
-volatile uint8_t ring_head;            // received bytes, modulo 256
-volatile uint8_t ring_tail;            // bytes taken, modulo 256
+volatile uint8_t ring[RX_RING_BYTES];  // written by the interrupt
+
+// Received bytes and bytes taken, modulo 256, and the emergency bytes in a row, where IN and OUT reach them:
+// timer 0 is not used.
+#define RING_HEAD GPIOR2
+#define RING_TAIL OCR0A
+#define EMERGENCY_RUN OCR0B
+
 volatile uint8_t overruns;
 volatile uint8_t ring_full;
+
+volatile uint8_t holds;
+volatile uint8_t emergency_seen;
 
 const uint8_t* volatile sending;
 volatile uint8_t sending_left;
@@ -35,10 +45,10 @@ void serial_init() {
 }
 
 bool serial_read(uint8_t& byte) {
-    const uint8_t tail = ring_tail;
-    if (tail == ring_head) return false;
+    const uint8_t tail = RING_TAIL;
+    if (tail == RING_HEAD) return false;
     byte = ring[tail & (RX_RING_BYTES - 1)];
-    ring_tail = static_cast<uint8_t>(tail + 1);
+    RING_TAIL = static_cast<uint8_t>(tail + 1);
     return true;
 }
 
@@ -54,29 +64,44 @@ uint8_t serial_overruns() { return overruns; }
 
 uint8_t serial_ring_full() { return ring_full; }
 
+uint8_t hold_count() { return holds; }
+
+Emergency emergency() { return static_cast<Emergency>(emergency_seen); }
+
+void emergency_clear() {
+    EMERGENCY_RUN = 0;
+    emergency_seen = static_cast<uint8_t>(Emergency::NONE);
+}
+
 }  // namespace hal
 
 // The interrupts, in assembler with registers that no other code uses: see step_interrupts.cpp.
 
-// Cycles with entry and jump: 38 for a byte stored, 36 for one that finds no room, 44 after an overrun. A
-// byte comes every 640 at the fastest.
+// Cycles with entry and jump: 40 for a byte stored or one that finds no room, 46 after an overrun, 37 for a
+// hold, 42 for an emergency byte that is not the last. A byte comes every 640
+// at the fastest. After the last emergency byte both pins are low 44 cycles after the interrupt's beginning.
 ISR(USART_RX_vect, ISR_NAKED) {
     __asm__ __volatile__(
         R"(
         in   r2, %[sreg]
         movw r4, r30
         lds  r3, %[status]              ; before the byte, which moves it on
-        lds  r8, %[data]
-        lds  r30, %[head]
-        lds  r31, %[tail]
+        lds  r30, %[data]
+        mov  r8, r30
+        subi r30, %[special]
+        cpi  r30, 2
+        brlo 4f
+        in   r30, %[head]
+        in   r31, %[tail]
         sub  r31, r30
         cpi  r31, lo8(-(%[size]))
         breq 2f
         mov  r9, r30
         inc  r9
-        sts  %[head], r9
+        out  %[head], r9
         andi r30, %[size] - 1
         ldi  r31, 0
+        out  %[run], r31
         subi r30, lo8(-(%[ring]))
         sbci r31, hi8(-(%[ring]))
         st   Z, r8
@@ -86,7 +111,9 @@ ISR(USART_RX_vect, ISR_NAKED) {
         out  %[sreg], r2
         reti
 
-    2:  lds  r30, %[full]
+    2:  ldi  r31, 0                     ; no room
+        out  %[run], r31
+        lds  r30, %[full]
         inc  r30
         sts  %[full], r30
         rjmp 1b
@@ -97,10 +124,55 @@ ISR(USART_RX_vect, ISR_NAKED) {
         movw r30, r4
         out  %[sreg], r2
         reti
+
+    4:  tst  r30                        ; out of band
+        brne 6f
+        out  %[run], r30                ; hold
+        lds  r30, %[holds]
+        inc  r30
+        sts  %[holds], r30
+        movw r30, r4
+        out  %[sreg], r2
+        reti
+
+    6:  in   r30, %[run]                ; emergency
+        inc  r30
+        out  %[run], r30
+        cpi  r30, %[repeats]
+        brsh 7f
+        movw r30, r4
+        out  %[sreg], r2
+        reti
+
+    7:  ldi  r30, %[all_disarmed]       ; end all pulses
+        sts  %[tccra], r30
+        ldi  r30, %[all_forced]
+        sts  %[tccrc], r30
+        ldi  r30, 0
+        sts  %[timsk], r30
+        ldi  r30, %[line]
+        sts  %[emergency], r30
+        movw r30, r4
+        out  %[sreg], r2
+        reti
         )" ::[sreg] "I"(_SFR_IO_ADDR(SREG)),
-        [status] "i"(&UCSR0A), [data] "i"(&UDR0), [overrun] "i"(DOR0), [head] "i"(&hal::ring_head),
-        [tail] "i"(&hal::ring_tail), [ring] "i"(hal::ring), [size] "i"(hal::RX_RING_BYTES),
-        [full] "i"(&hal::ring_full), [overruns] "i"(&hal::overruns));
+        [status] "i"(&UCSR0A), [data] "i"(&UDR0), [overrun] "i"(DOR0), [special] "M"(planarm::FIRST_SPECIAL),
+        [head] "I"(_SFR_IO_ADDR(RING_HEAD)), [tail] "I"(_SFR_IO_ADDR(RING_TAIL)),
+        [run] "I"(_SFR_IO_ADDR(EMERGENCY_RUN)), [ring] "i"(hal::ring), [size] "i"(hal::RX_RING_BYTES),
+        [full] "i"(&hal::ring_full), [overruns] "i"(&hal::overruns), [holds] "i"(&hal::holds),
+        [repeats] "M"(planarm::wire::EMERGENCY_REPEATS), [all_disarmed] "M"(_BV(COM1A1) | _BV(COM1B1)),
+        [all_forced] "M"(_BV(FOC1A) | _BV(FOC1B)), [tccra] "i"(&TCCR1A), [tccrc] "i"(&TCCR1C),
+        [timsk] "i"(&TIMSK1), [line] "M"(static_cast<uint8_t>(hal::Emergency::LINE)),
+        [emergency] "i"(&hal::emergency_seen));
+}
+
+// The stop input's contact opened: what the last emergency byte does.
+ISR(PCINT1_vect) {
+    if ((PINC & _BV(PINC0)) == 0) return;
+    TCCR1A = _BV(COM1A1) | _BV(COM1B1);
+    TCCR1C = _BV(FOC1A) | _BV(FOC1B);
+    TIMSK1 = 0;
+    hal::emergency_seen = static_cast<uint8_t>(hal::Emergency::INPUT);
 }
 
 // 34 cycles with entry and jump, 36 after the last byte; once every 640.

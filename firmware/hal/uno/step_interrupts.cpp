@@ -1,23 +1,24 @@
 // The step interrupts in assembler: step_engine::on_match of core/step_engine.h, statement by statement.
 //
-// No compiled or library code uses r2 to r12: platformio.ini keeps the compiler off them, build.py checks the
+// No compiled or library code uses r2 to r15: platformio.ini keeps the compiler off them, build.py checks the
 // linked program. The interrupts, which never nest, need no stack. Here they hold
-//   r2         the status register         r4, r5  the interrupted code's r30, r31
-//   r3, r8     fraction, then edge         r6, r7  the interrupted code's r24, r25
-//   r9 to r12  interval; r9 also how a run follows
+//   r2         the status register         r8 to r11  interval, then edge (r8, r9)
+//   r4, r5     the interrupted code's Z    r12, r13   fraction of joint 1
+//   r6, r7     its r24 and r25             r14, r15   fraction of joint 2
+//   r3         a byte on its way
 //
 // Cycles from the match, if nothing else runs, with entry (4) and the jump from the vector (3):
-//                            all    pin falls   look at the timer   next edge armed
-//   one step after another   104       61              63                77
-//   on in one direction       86       57              63                77
-//   on and back               96       57              73                87
-//   going idle                64       50
-//   a step missed             91, after a change of DIR 101
+//                            all    pin falls   look at the timer   next edge placed
+//   one step after another    78       58              60                71
+//   on in one direction       82       59              61                75
+//   on and back               92       59              71                85
+//   going idle                77       59
+//   a step missed             85, after the last of a run 89, after a change of DIR 99
 // tests/firmware/test_firmware_cycles.py counts them. The least interval of one joint covers what may run
-// when its step rises (the longest lock of the main program, 50, or the receive interrupt, 44), the other
-// joint's interrupt (104), one instruction of the main program after each (4), its own way to the look at the
-// timer (63), and the least low time (32): 257. From a step to one back the look comes after 73 and asks for
-// the DIR setup time (320): 555.
+// when its step rises (the longest lock of the main program or the receive interrupt, 41), the other joint's
+// interrupt (78), one instruction of the main program after each (4), its own way to the look at the timer
+// (60), and what that asks for (38): 225. From a step to one back the look comes after 71 and asks for the
+// DIR setup time (320).
 
 #include <avr/interrupt.h>
 #include <avr/io.h>
@@ -36,6 +37,9 @@ static_assert(static_cast<uint8_t>(Chain::NONE) == 0, "tst finds a joint that go
 static_assert(static_cast<uint8_t>(Chain::REVERSED) == 2, "bit 1 finds a reversal");
 static_assert(sizeof(Run*) == 2 && sizeof(bool) == 1, "widths of loads");
 
+// The first of the joint's two registers for the fraction; the assembler takes registers by number.
+constexpr uint8_t fraction_register(uint8_t joint) { return joint == 0 ? 12 : 14; }
+
 template <uint8_t JOINT>
 HAL_INLINE void step_interrupt() {
     __asm__ __volatile__(
@@ -45,114 +49,102 @@ HAL_INLINE void step_interrupt() {
         movw r6, r24
         lds  r30, %[active]
         lds  r31, %[active] + 1
-        ldd  r24, Z + %[left]           ; count the step
-        ldd  r25, Z + %[left] + 1
-        sbiw r24, 1
-        std  Z + %[left], r24
-        std  Z + %[left] + 1, r25
+        in   r24, %[left]               ; count the step
+        dec  r24
+        out  %[left], r24
         breq 1f
 
-        ldd  r3, Z + %[fraction]        ; interval + fraction
-        ldd  r8, Z + %[fraction] + 1
-        ldd  r9, Z + %[interval]
-        ldd  r10, Z + %[interval] + 1
-        ldd  r11, Z + %[interval] + 2
-        ldd  r12, Z + %[interval] + 3
-        add  r3, r9
-        adc  r8, r10
-        std  Z + %[fraction], r3
-        std  Z + %[fraction] + 1, r8
-        lds  r3, %[ocr]                 ; the next edge
-        lds  r8, %[ocr] + 1
-        adc  r3, r11
-        adc  r8, r12
-        sts  %[ocr] + 1, r8
-        sts  %[ocr], r3
-        lds  r24, %[tccra]              ; fall
-        andi r24, %[disarmed]
-        sts  %[tccra], r24
-        ldi  r25, %[foc]
-        sts  %[tccrc], r25
-        lds  r25, %[tcnt]               ; late?
-        sub  r3, r25
+        ldd  r8, Z + %[interval]
+        ldd  r9, Z + %[interval] + 1
+        ldd  r10, Z + %[interval] + 2
+        ldd  r11, Z + %[interval] + 3
+        lds  r24, %[ocr]                ; the next edge
+        lds  r25, %[ocr] + 1
+        add  %[part], r8
+        adc  %[part] + 1, r9
+        adc  r24, r10
+        adc  r25, r11
+        ldd  r3, Z + %[add]             ; interval += add
+        add  r8, r3
+        std  Z + %[interval], r8
+        ldd  r3, Z + %[add] + 1
+        adc  r9, r3
+        std  Z + %[interval] + 1, r9
+        ldd  r3, Z + %[add] + 2
+        adc  r10, r3
+        std  Z + %[interval] + 2, r10
+        ldd  r3, Z + %[add] + 3
+        adc  r11, r3
+        std  Z + %[interval] + 3, r11
+        movw r8, r24
+        ldi  r24, %[foc]                ; fall
+        sts  %[tccrc], r24
+        lds  r24, %[tcnt]               ; late?
         lds  r25, %[tcnt] + 1
-        sbc  r8, r25
-        ldi  r25, %[step_margin]
-        sub  r3, r25
-        ldi  r25, 0
-        sbc  r8, r25
-        cp   r3, r11
-        cpc  r8, r12
-        brcc 5f
-        ori  r24, %[armed]
-        sts  %[tccra], r24
-        ldd  r24, Z + %[add]            ; interval += add
-        add  r9, r24
-        std  Z + %[interval], r9
-        ldd  r24, Z + %[add] + 1
-        adc  r10, r24
-        std  Z + %[interval] + 1, r10
-        ldd  r24, Z + %[add] + 2
-        adc  r11, r24
-        std  Z + %[interval] + 2, r11
-        ldd  r24, Z + %[add] + 3
-        adc  r12, r24
-        std  Z + %[interval] + 3, r12
+        subi r24, lo8(-(%[step_margin]))
+        sbci r25, hi8(-(%[step_margin]))
+        cp   r8, r24
+        cpc  r9, r25
+        brmi 5f
+        sts  %[ocr] + 1, r9
+        sts  %[ocr], r8
         movw r24, r6
         movw r30, r4
         out  %[sreg], r2
         reti
 
-    1:  rjmp 2f                         ; as far as a branch reaches
-
-    5:  ldi  r24, %[both_disarmed]      ; a step is missed
-        sts  %[tccra], r24
-        ldi  r24, 0
-        sts  %[timsk], r24
-        ldi  r24, 1
-        sts  %[missed], r24
-    6:  movw r24, r6
-        movw r30, r4
-        out  %[sreg], r2
-        reti
-
-    2:  ldd  r24, Z + %[next]           ; the run is done
+    1:  ldd  r24, Z + %[next]           ; the run is done
         ldd  r25, Z + %[next] + 1
         sts  %[active], r24
         sts  %[active] + 1, r25
         movw r30, r24
-        lds  r24, %[tccra]
-        andi r24, %[disarmed]
-        ldi  r25, %[foc]
-        ldd  r9, Z + %[chained]
-        tst  r9
+        ldd  r24, Z + %[steps]
+        out  %[left], r24
+        ldd  %[part], Z + %[fraction]
+        ldd  %[part] + 1, Z + %[fraction] + 1
+        ldd  r8, Z + %[first]
+        ldd  r9, Z + %[first] + 1
+        ldd  r3, Z + %[chained]
+        rjmp .+0                        ; the pulse is as long as any other
+        rjmp .+0
+        rjmp .+0
+        rjmp .+0
+        rjmp .+0
+        rjmp .+0
+        ldi  r24, %[foc]                ; fall
+        sts  %[tccrc], r24
+        tst  r3
         breq 4f
-        ldd  r3, Z + %[first]
-        ldd  r8, Z + %[first] + 1
-        sts  %[ocr] + 1, r8
-        sts  %[ocr], r3
-        sts  %[tccra], r24              ; fall
-        sts  %[tccrc], r25
-        sbrc r9, 1
+        sbrc r3, 1
         rjmp 3f
-        ldi  r30, %[step_margin]
-        ldi  r31, 0
-    7:  lds  r25, %[tcnt]               ; late?
-        sub  r3, r25
+        ldi  r30, lo8(%[step_margin])
+        ldi  r31, hi8(%[step_margin])
+    7:  lds  r24, %[tcnt]               ; late?
         lds  r25, %[tcnt] + 1
-        sbc  r8, r25
-        sub  r3, r30
-        sbc  r8, r31
-        ldi  r30, lo8(%[most_ahead] + 1)
-        ldi  r31, hi8(%[most_ahead] + 1)
-        cp   r3, r30
-        cpc  r8, r31
-        brcc 5b
-        ori  r24, %[armed]
-        sts  %[tccra], r24
-        rjmp 6b
+        add  r24, r30
+        adc  r25, r31
+        cp   r8, r24
+        cpc  r9, r25
+        brmi 5f
+        sts  %[ocr] + 1, r9
+        sts  %[ocr], r8
+        movw r24, r6
+        movw r30, r4
+        out  %[sreg], r2
+        reti
 
-    3:  ldd  r25, Z + %[positive]       ; turn round
+    5:  lds  r24, %[timsk]              ; a step is missed
+        sts  %[missed], r24
+        ldi  r24, %[all_disarmed]
+        sts  %[tccra], r24
+        ldi  r24, 0
+        sts  %[timsk], r24
+        movw r24, r6
+        movw r30, r4
+        out  %[sreg], r2
+        reti
+
+    3:  ldd  r25, Z + %[dir_high]       ; turn round
         sbrc r25, 0
         sbi  %[dir_port], %[dir_bit]
         sbrs r25, 0
@@ -161,32 +153,63 @@ HAL_INLINE void step_interrupt() {
         ldi  r31, hi8(%[dir_margin])
         rjmp 7b
 
-    4:  sts  %[tccra], r24              ; fall and go idle
-        sts  %[tccrc], r25
+    4:  lds  r24, %[tccra]              ; go idle
+        andi r24, %[other]
+        ori  r24, %[disarmed]
+        sts  %[tccra], r24
         lds  r24, %[timsk]
         andi r24, %[silent]
         sts  %[timsk], r24
-        rjmp 6b
+        movw r24, r6
+        movw r30, r4
+        out  %[sreg], r2
+        reti
         )" ::[sreg] "I"(_SFR_IO_ADDR(SREG)),
-        [active] "i"(&step_joints[JOINT].active), [left] "i"(offsetof(Run, steps_left)),
-        [fraction] "i"(offsetof(Run, fraction)), [interval] "i"(offsetof(Run, interval_q16)),
-        [add] "i"(offsetof(Run, add_q16)), [next] "i"(offsetof(Run, next)),
-        [chained] "i"(offsetof(Run, chained)), [first] "i"(offsetof(Run, first_ticks)),
-        [positive] "i"(offsetof(Run, positive)), [ocr] "i"(JOINT == 0 ? &OCR1AL : &OCR1BL),
+        [left] "I"(_SFR_IO_ADDR(JOINT == 0 ? GPIOR0 : GPIOR1)), [active] "i"(&step_joints[JOINT].active),
+        [part] "I"(fraction_register(JOINT)), [steps] "I"(offsetof(Run, steps)),
+        [fraction] "I"(offsetof(Run, fraction)), [interval] "I"(offsetof(Run, interval_q16)),
+        [add] "I"(offsetof(Run, add_q16)), [next] "I"(offsetof(Run, next)),
+        [chained] "I"(offsetof(Run, chained)), [first] "I"(offsetof(Run, first_ticks)),
+        [dir_high] "I"(offsetof(Run, dir_high)), [ocr] "i"(JOINT == 0 ? &OCR1AL : &OCR1BL),
         [tccra] "i"(&TCCR1A), [tccrc] "i"(&TCCR1C), [tcnt] "i"(&TCNT1L), [timsk] "i"(&TIMSK1),
-        [foc] "i"(JOINT == 0 ? _BV(FOC1A) : _BV(FOC1B)), [armed] "i"(JOINT == 0 ? _BV(COM1A0) : _BV(COM1B0)),
-        [disarmed] "i"(0xFF & ~(JOINT == 0 ? _BV(COM1A0) : _BV(COM1B0))),
-        [both_disarmed] "i"(_BV(COM1A1) | _BV(COM1B1)),
+        [foc] "i"(JOINT == 0 ? _BV(FOC1A) : _BV(FOC1B)),
+        [other] "i"(JOINT == 0 ? _BV(COM1B1) | _BV(COM1B0) : _BV(COM1A1) | _BV(COM1A0)),
+        [disarmed] "i"(JOINT == 0 ? _BV(COM1A1) : _BV(COM1B1)), [all_disarmed] "i"(_BV(COM1A1) | _BV(COM1B1)),
         [silent] "i"(0xFF & ~(JOINT == 0 ? _BV(OCIE1A) : _BV(OCIE1B))),
         [step_margin] "i"(planarm::step_engine::STEP_MARGIN_TICKS),
-        [dir_margin] "i"(planarm::step_engine::DIR_MARGIN_TICKS), [most_ahead] "i"(planarm::MAX_AHEAD_TICKS),
-        [dir_port] "I"(_SFR_IO_ADDR(PORTD)), [dir_bit] "I"(JOINT == 0 ? PORTD4 : PORTD5),
-        [missed] "i"(&step_missed));
+        [dir_margin] "i"(planarm::step_engine::DIR_MARGIN_TICKS), [dir_port] "I"(_SFR_IO_ADDR(PORTD)),
+        [dir_bit] "I"(JOINT == 0 ? PORTD4 : PORTD5), [missed] "i"(&step_missed));
 }
 
-static_assert(planarm::step_engine::STEP_MARGIN_TICKS < 0x100, "the step margin is one byte here");
-
 }  // namespace
+
+namespace hal {
+
+template <>
+uint16_t step_fraction<0>() {
+    uint16_t fraction;
+    __asm__ __volatile__("movw %0, r12" : "=r"(fraction));
+    return fraction;
+}
+
+template <>
+uint16_t step_fraction<1>() {
+    uint16_t fraction;
+    __asm__ __volatile__("movw %0, r14" : "=r"(fraction));
+    return fraction;
+}
+
+template <>
+void set_step_fraction<0>(uint16_t fraction) {
+    __asm__ __volatile__("movw r12, %0" ::"r"(fraction));
+}
+
+template <>
+void set_step_fraction<1>(uint16_t fraction) {
+    __asm__ __volatile__("movw r14, %0" ::"r"(fraction));
+}
+
+}  // namespace hal
 
 ISR(TIMER1_COMPA_vect, ISR_NAKED) { step_interrupt<0>(); }
 

@@ -11,7 +11,7 @@ receive ring can hold, and sends all of it again when
 A repeated acknowledgement is believed once in a time-out only, and not sooner after the frame was sent than any answer
 ever came: such a reply was under way before the frame arrived. Copies that turn out to be superfluous are answered with
 repeated acknowledgements too, and without that rule each answer would cause the next copies (the "sorcerer's
-apprentice" of RFC 1123, 4.2.3.1). It is not believed at all when the reply says that the device is merely out of slots
+apprentice" of RFC 1123, 4.2.3.1). It is not believed at all when the reply says that the device is merely out of room
 for the oldest frame: that frame is asked again at the time-out.
 
 The time-out follows the measured round trip as in RFC 6298 (Karn's rule included), between two bounds. At 250,000 baud
@@ -62,7 +62,7 @@ class ArqCounters:
 @dataclass(slots=True)
 class _Outstanding:
     frame: bytes
-    slots: int
+    room: int
     sent_s: float
     first: bool = True  # never sent again, so its round trip can be measured
 
@@ -74,7 +74,7 @@ class GoBackN:
         self.next_seq = next_seq
         self.window_bytes = window_bytes
         self.bytes_in_flight = 0
-        self.slots_in_flight = 0
+        self.room_in_flight = 0
         self.counters = ArqCounters()
         self._outstanding: deque[_Outstanding] = deque()
         self._smoothed_s: float | None = None
@@ -99,25 +99,25 @@ class GoBackN:
         """Whether `frame` may go out now without exceeding the window."""
         return self.bytes_in_flight + len(frame) <= self.window_bytes
 
-    def send(self, frame: bytes, slots: int, now_s: float) -> bytes:
+    def send(self, frame: bytes, room: int, now_s: float) -> bytes:
         """Take `frame`, encoded with `next_seq`, into the window and return the bytes to write.
 
-        `slots` is the number of queue slots that the frame fills on the device. The caller asks `fits` first.
+        `room` is what the frame takes of the device's queue, in bytes. The caller asks `fits` first.
         """
         if not self.fits(frame):
             raise ValueError(f"{len(frame)} bytes do not fit: {self.bytes_in_flight} of {self.window_bytes} in flight")
         if not self._outstanding:
             self._timer_s = now_s
-        self._outstanding.append(_Outstanding(frame, slots, now_s))
+        self._outstanding.append(_Outstanding(frame, room, now_s))
         self.bytes_in_flight += len(frame)
-        self.slots_in_flight += slots
+        self.room_in_flight += room
         self.next_seq = (self.next_seq + 1) % _SEQUENCE
         self.counters.frames_sent += 1
         self.counters.bytes_sent += len(frame)
         return frame
 
-    def on_ack(self, ack: int, free_slots: int, now_s: float) -> tuple[Ack, bytes]:
-        """Take in a reply: `ack` is the number the device expects next, `free_slots` what it can queue.
+    def on_ack(self, ack: int, free_room: int, now_s: float) -> tuple[Ack, bytes]:
+        """Take in a reply: `ack` is the number the device expects next, `free_room` what it can queue.
 
         Returns what the acknowledgement says, and the bytes to write again, if any.
         """
@@ -125,11 +125,11 @@ class GoBackN:
         if advance > len(self._outstanding):
             return Ack.STRAY, b""
         if advance == 0:
-            return Ack.REPEATED, self._on_repeated(free_slots, now_s)
+            return Ack.REPEATED, self._on_repeated(free_room, now_s)
         for _ in range(advance):
             newest = self._outstanding.popleft()
             self.bytes_in_flight -= len(newest.frame)
-            self.slots_in_flight -= newest.slots
+            self.room_in_flight -= newest.room
         if newest.first:
             self._measure(now_s - newest.sent_s)
         self._timer_s = now_s
@@ -147,10 +147,10 @@ class GoBackN:
     def _wait_s(self) -> float:
         return min(self._timeout_s * self._patience, MAX_TIMEOUT_S)
 
-    def _on_repeated(self, free_slots: int, now_s: float) -> bytes:
+    def _on_repeated(self, free_room: int, now_s: float) -> bytes:
         if not self._outstanding:
             return b""
-        if self._outstanding[0].slots > free_slots:
+        if self._outstanding[0].room > free_room:
             self.counters.busy_replies += 1
             return b""
         self.counters.repeated_acks += 1

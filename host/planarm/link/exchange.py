@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from planarm.errors import DeviceFault, LinkError
 from planarm.link.position import Certainty, PositionReport, StreamError, StreamFault, moved_usteps
 from planarm.link.session import Session, SessionLimits, fault_words
-from planarm.link.stream import Stream, StreamOptions, StreamProgress
+from planarm.link.stream import Phase, Stream, StreamOptions, StreamProgress
 from planarm.link.transport import Transport
 from planarm_wire.messages import Fault, HostMessage, Ledger, Query, Segment, State, Status
 
@@ -62,8 +62,9 @@ def stream_plan(
     Raises LinkError (StreamError once the motion has begun) when the line fails, DeviceFault (StreamFault) when the
     device latches a fault or refuses, StepsDifferError when the ledger does not show the plan's steps, and
     CertificateError when `segments` are no whole motion. Stream errors carry a `position`. Without segments the arm is
-    where it should be: the device is asked for its ledger, and nothing is enabled. Ctrl-C during a motion ends in a
-    StreamError, after the board has come to rest; a second Ctrl-C does not wait for that.
+    where it should be: the device is asked for its ledger, and nothing is enabled. Ctrl-C during a motion is a hold:
+    the arm slows down and rests on the path. A second Ctrl-C is a stop: the rest of the plan is dropped, and a
+    StreamError tells the position. A third does not wait for that.
     """
     began_s = transport.clock.now_s()
     if not segments:
@@ -73,14 +74,12 @@ def stream_plan(
     session = _new_session(transport, limits)
     stream = Stream(session, segments, options, on_progress)
     try:
-        _drive(transport, session, lambda: stream.done, stream)
+        _drive_with_keyboard(transport, session, stream)
     except KeyboardInterrupt as stop:
         if stream.ledger_before is None:
             raise
-        # The wire has no stop yet: what is queued runs on, and then the device latches an underrun.
         position, _ = _find_position(transport, session, stream)
-        told = "stopped by the keyboard: nothing more was sent, the board ran what it had and stopped abruptly"
-        raise StreamError(told, position) from stop
+        raise StreamError("left by the keyboard before the arm had come to rest", position) from stop
     except (LinkError, DeviceFault) as error:
         if stream.ledger_before is None:  # nothing was queued yet, so nothing moved
             raise
@@ -89,7 +88,22 @@ def stream_plan(
             raise StreamError(str(error), position) from error
         cause = fault_words(fault) if fault is not Fault.NONE else str(error)  # a refusal may foretell a fault
         raise StreamFault(cause, position) from error
+    if stream.stopped:
+        assert session.status is not None, "a stop is seen in a status"
+        raise StreamError("stopped by the keyboard", _report(Certainty.EXACT, session.status, stream))
     return _result(session, transport.clock.now_s(), began_s, stream)
+
+
+def _drive_with_keyboard(transport: Transport, session: Session, stream: Stream) -> None:
+    """Carry the plan out; the first Ctrl-C in motion holds, the second stops, the third is raised."""
+    answers = [stream.hold, stream.stop]
+    while True:
+        try:
+            return _drive(transport, session, lambda: stream.done, stream)
+        except KeyboardInterrupt:
+            if stream.phase is not Phase.RUNNING or not answers:
+                raise
+            answers.pop(0)()
 
 
 def open_session(transport: Transport, limits: SessionLimits | None = None) -> Session:

@@ -12,13 +12,14 @@ from dataclasses import dataclass
 
 from planarm.errors import DeviceFault, LinkError
 from planarm.link.arq import Ack, ArqCounters, GoBackN
-from planarm_wire.codec import decode, encode
+from planarm_wire.codec import decode, encode, encoded_bytes
 from planarm_wire.errors import WireError
 from planarm_wire.framing import Frame, FrameDecoder, encode_frame
 from planarm_wire.messages import (
     DELIMITER,
     FAULT_WORDS,
     PROTOCOL_VERSION,
+    QUEUE_FRAME_BYTES,
     RESULT_WORDS,
     SPEC_HASH,
     Fault,
@@ -109,9 +110,9 @@ class Session:
         return self._arq.counters
 
     @property
-    def slots_in_flight(self) -> int:
-        """Segments sent and not acknowledged."""
-        return self._arq.slots_in_flight
+    def room_in_flight(self) -> int:
+        """Bytes of the device's queue that frames sent and not acknowledged take."""
+        return self._arq.room_in_flight
 
     @property
     def deadline_s(self) -> float:
@@ -141,8 +142,11 @@ class Session:
         if self._arq.idle:
             self._waiting_since_s = now_s
         self._names[self._arq.next_seq] = type(message).__name__.upper()
-        slots = len(message.segments) if isinstance(message, Segments) else 0
-        self._output += self._arq.send(self._encode(message), slots, now_s)
+        self._output += self._arq.send(self._encode(message), room_of(message), now_s)
+
+    def send_out_of_band(self, code: int) -> None:
+        """Send a byte that acts in the device's receive interrupt, before everything else."""
+        self._output.insert(0, code)
 
     def take_output(self) -> bytes:
         """Return the bytes to write, once."""
@@ -239,7 +243,7 @@ class Session:
             raise LinkError("the device restarted, or another program released its drivers: it reports idle")
 
     def _on_status(self, ack: int, status: Status, now_s: float) -> None:
-        verdict, again = self._arq.on_ack(ack, status.free_slots, now_s)
+        verdict, again = self._arq.on_ack(ack, status.free_bytes, now_s)
         if verdict is Ack.STRAY:
             raise LinkError(
                 f"the device restarted, or another program speaks to it: it expects frame {ack},"
@@ -288,6 +292,11 @@ class Session:
         if self._encoded is None or self._encoded[0] is not message or self._encoded[1] != seq:
             self._encoded = (message, seq, encode_frame(seq, *encode(message)))
         return self._encoded[2]
+
+
+def room_of(message: HostMessage) -> int:
+    """Return the bytes that a message takes in the device's queue."""
+    return encoded_bytes(message) + QUEUE_FRAME_BYTES if isinstance(message, Segments) else 0
 
 
 def fault_words(fault: Fault) -> str:

@@ -1,10 +1,13 @@
 """Streams a plan: asks, clears, enables, fills the queue, starts, keeps the queue full, and checks what was executed.
 
 A machine of explicit phases on top of a `Session`; no I/O. The device's queue is filled by credit: a reply tells the
-free slots at the moment of its acknowledgement, so what may still be sent is that number less the segments in flight.
+free bytes at the moment of its acknowledgement, so what may still be sent is that number less what is in flight.
 Segments go out in messages as full as they can be, each at most half of the window long, so that one is on the line
 while the other is acknowledged. When no message is in flight the device is asked for its status, no sooner than the
 segments now executing can have made room for the next message.
+
+`hold`, `resume`, `override` and `stop` may be called at any time; each says what the device is to do, and its status
+says when it is done. A hold that nobody here asked for, as a damaged byte may cause, is taken back.
 """
 
 from collections.abc import Callable, Sequence
@@ -17,26 +20,41 @@ from planarm.link.position import moved_usteps
 from planarm.link.session import Session
 from planarm_wire.codec import encoded_bytes
 from planarm_wire.messages import (
+    DEFAULT_WAKE_TICKS,
+    HOLD_CODE,
     HOST_WINDOW_BYTES,
     MAX_PAYLOAD_BYTES,
-    QUEUE_SLOTS,
+    QUEUE_BYTES,
+    QUEUE_FRAME_BYTES,
     TICKS_HZ,
     Clear,
+    Config,
     Enable,
     Fault,
+    HostMessage,
     Ledger,
+    Override,
+    PinMap,
     Query,
+    Resume,
     Segment,
     Segments,
     Start,
     State,
     Status,
+    Stop,
 )
+from planarm_wire.rates import NO_ALLOWANCE, Allowance, head_of
 from planarm_wire.steps import duration_ticks, is_last, signed_steps
 
 FRAME_BYTES = HOST_WINDOW_BYTES // 2
 MIN_POLL_S = 0.002  # a status and its question take 1.5 ms of the line
 MAX_POLL_S = 0.050  # keeps progress alive during long segments
+HEAD_BYTES = 3  # slow, fast and need of a SEGMENTS message
+LEAST_SEGMENT_BYTES = 3
+PERCENT = 100
+AT_EASE = (State.HOLDING, State.HELD, State.STARVED, State.STOPPING)
+"""States of a motion in which the path clock does not keep the plan's time."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,11 +63,15 @@ class StreamOptions:
 
     `lead_ticks` lies between START and the first segment; the 10 ms cover a DM542's response to ENABLE, quoted as under
     5 ms. `release_when_done` lets go of the joints at the end: a loaded arm falls, so the drivers stay enabled unless
-    asked.
+    asked. `allowances`, one a segment, let the device slow down along the path; without them it cannot. The motors'
+    `start_stop_ticks` tell it from which interval on they may stop dead; a device whose drivers are enabled keeps what
+    it was told before.
     """
 
     lead_ticks: int = 160_000
     release_when_done: bool = False
+    allowances: tuple[Allowance, ...] = ()
+    start_stop_ticks: tuple[int, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,9 +84,10 @@ class StreamProgress:
     executed_segments: int
     total_segments: int
     queued_segments: int
-    """Segments in the device's queue."""
+    """Segments sent and not yet executed."""
     moved_usteps: tuple[int, ...]
     """Signed micro-steps of each joint since the start, those of the running segment included."""
+    state: State
 
 
 class Phase(Enum):
@@ -73,6 +96,7 @@ class Phase(Enum):
     OPENING = auto()
     ASKING = auto()
     CLEARING = auto()
+    CONFIGURING = auto()
     ENABLING = auto()
     FILLING = auto()
     STARTING = auto()
@@ -100,8 +124,10 @@ class Stream:
         self.ledger_before: Ledger | None = None
         self.cleared_fault = Fault.NONE
         self.started_s = 0.0
-        self.least_queued = QUEUE_SLOTS
+        self.least_queued = len(segments)
         self.sent_segments = 0
+        self.stopped = False
+        self.unasked_holds = 0
         self._session = session
         self._segments = tuple(segments)
         self._options = options or StreamOptions()
@@ -111,6 +137,10 @@ class Stream:
         self._executed = 0
         self._executed_s = 0.0
         self._message: Segments | None = None
+        self._allowances = self._options.allowances or (NO_ALLOWANCE,) * len(self._segments)
+        self._hold_wanted = False
+        self._stop_wanted = False
+        self._orders: list[HostMessage] = []
 
     @property
     def done(self) -> bool:
@@ -121,6 +151,27 @@ class Stream:
     def total_segments(self) -> int:
         """Segments of the plan."""
         return len(self._segments)
+
+    # -- what the owner may ask of a motion ---------------------------------------------------------------------------
+
+    def hold(self) -> None:
+        """Slow down along the path and rest there; in effect within a few milliseconds, whatever is in flight."""
+        self._hold_wanted = True
+        self._session.send_out_of_band(HOLD_CODE)
+
+    def resume(self) -> None:
+        """Go on after a hold."""
+        self._hold_wanted = False
+        self._orders.append(Resume())
+
+    def override(self, percent: int) -> None:
+        """Let the path clock run at 1 to 100 % of the planned rate."""
+        self._orders.append(Override(percent))
+
+    def stop(self, *, quick: bool = False) -> None:
+        """Slow down along the path and drop the rest of the plan; `stopped` tells when the arm rests."""
+        self._stop_wanted = True
+        self._orders.append(Stop(int(quick)))
 
     @property
     def deadline_s(self) -> float:
@@ -135,7 +186,8 @@ class Stream:
         steps = {
             Phase.OPENING: self._ask,
             Phase.ASKING: self._prepare,
-            Phase.CLEARING: self._enable,
+            Phase.CLEARING: self._configure,
+            Phase.CONFIGURING: self._enable,
             Phase.ENABLING: self._begin_filling,
             Phase.FILLING: self._fill,
             Phase.STARTING: self._begin_running,
@@ -160,14 +212,21 @@ class Stream:
         if not self._session.idle:
             return
         status = self._status
-        if status.state is State.RUNNING:
+        if status.state in (State.RUNNING, State.HOMING, *AT_EASE):
             raise LinkError(
                 "the device is executing the motion of an earlier session; wait until it has ended, then try again"
             )
-        if status.state is State.FAULT or status.free_slots < QUEUE_SLOTS:
+        if status.state is State.FAULT or status.free_bytes < QUEUE_BYTES - QUEUE_FRAME_BYTES:
             self.cleared_fault = status.fault
             self._session.send(Clear(), now_s)
         self.phase = Phase.CLEARING
+
+    def _configure(self, now_s: float) -> None:
+        if not self._session.idle:
+            return
+        if self._status.state is State.IDLE and self._options.start_stop_ticks:
+            self._session.send(config_of(self._options.start_stop_ticks), now_s)
+        self.phase = Phase.CONFIGURING
 
     def _enable(self, now_s: float) -> None:
         if not self._session.idle:
@@ -198,13 +257,17 @@ class Stream:
 
     def _run(self, now_s: float) -> None:
         if self._status.state is State.READY:
-            self._check_ledger()
+            self.stopped = self._stop_wanted and self._executed < len(self._segments)
+            if not self.stopped:
+                self._check_ledger()
             if self._options.release_when_done:
                 self._session.guarded = False
                 self._session.send(Enable(0), now_s)
             self.phase = Phase.RELEASING
             return
-        self._send_segments(now_s)
+        self._send_orders(now_s)
+        if not self._stop_wanted:
+            self._send_segments(now_s)
         if not self._session.idle:
             return
         if now_s >= self._stall_due_s():
@@ -218,9 +281,18 @@ class Stream:
 
     # -- sending ------------------------------------------------------------------------------------------------------
 
+    def _send_orders(self, now_s: float) -> None:
+        """Send what the owner asked for, and take back a hold that nobody did."""
+        held = self._status.state in (State.HOLDING, State.HELD)
+        if held and not self._hold_wanted and not self._orders and self._session.idle:
+            self.unasked_holds += 1
+            self._orders.append(Resume())
+        while self._orders and self._session.fits(self._orders[0]):
+            self._session.send(self._orders.pop(0), now_s)
+
     def _send_segments(self, now_s: float) -> None:
         while (message := self._next_message()) is not None:
-            if len(message.segments) > self._credit or not self._session.fits(message):
+            if encoded_bytes(message) > self._credit or not self._session.fits(message):
                 return
             self._session.send(message, now_s)
             self.sent_segments += len(message.segments)
@@ -234,17 +306,22 @@ class Stream:
         return self._message
 
     def _pack(self) -> Segments:
-        chosen: list[Segment] = []
-        room_bytes = MAX_PAYLOAD_BYTES
-        for segment in self._segments[self.sent_segments : self.sent_segments + QUEUE_SLOTS]:
+        most = MAX_PAYLOAD_BYTES // LEAST_SEGMENT_BYTES
+        count, room_bytes = 0, MAX_PAYLOAD_BYTES - HEAD_BYTES
+        for segment in self._segments[self.sent_segments : self.sent_segments + most]:
             room_bytes -= encoded_bytes(segment)
             if room_bytes < 0:
                 break
-            chosen.append(segment)
-        message = Segments(tuple(chosen))
+            count += 1
+        message = self._message_of(count)
         while self._is_long(message):
-            message = Segments(message.segments[:-1])
+            message = self._message_of(len(message.segments) - 1)
         return message
+
+    def _message_of(self, count: int) -> Segments:
+        """Return the next `count` segments as a message; its head holds for all of them."""
+        part = slice(self.sent_segments, self.sent_segments + count)
+        return Segments(*head_of(self._allowances[part]), self._segments[part])
 
     def _is_long(self, message: Segments) -> bool:
         """Whether `message` takes more than its share of the window and can be made shorter."""
@@ -252,13 +329,20 @@ class Stream:
 
     @property
     def _credit(self) -> int:
-        return self._status.free_slots - self._session.slots_in_flight
+        """Payload bytes that the device's queue still takes."""
+        return self._status.free_bytes - self._session.room_in_flight
 
     def _poll_due_s(self) -> float:
         """When the device can have room for the next message, or can have ended."""
         message = self._next_message()
-        wanted = len(message.segments) - self._credit if message else len(self._segments)
-        until = min(self._executed + wanted, len(self._segments))
+        until = self._executed
+        if message is None:
+            until = len(self._segments)
+        else:  # a segment gives its bytes back when it is begun
+            wanted = encoded_bytes(message) - self._credit
+            while wanted > 0 and until < len(self._segments):
+                wanted -= encoded_bytes(self._segments[until])
+                until += 1
         wait_s = (self._ends_ticks[until] - self._ends_ticks[self._executed]) / TICKS_HZ
         return self._session.status_s + min(max(wait_s, MIN_POLL_S), MAX_POLL_S)
 
@@ -288,7 +372,7 @@ class Stream:
             )
         if executed != self._executed:
             self._executed, self._executed_s = executed, now_s
-        queued = QUEUE_SLOTS - status.free_slots
+        queued = self.sent_segments - executed
         if self.phase is Phase.RUNNING and self.sent_segments < len(self._segments):
             self.least_queued = min(self.least_queued, queued)
         if self._on_progress is not None:
@@ -303,10 +387,13 @@ class Stream:
             total_segments=len(self._segments),
             queued_segments=queued,
             moved_usteps=moved_usteps(self.ledger_before, status.ledger),
+            state=status.state,
         )
 
     def _stall_due_s(self) -> float:
-        """When the running segment should long have ended."""
+        """When the running segment should long have ended; never while the path clock rests or runs slowly."""
+        if self._status.state in AT_EASE or self._status.rate_percent < PERCENT:
+            return float("inf")
         running = min(self._executed, len(self._segments) - 1)
         ticks = duration_ticks(self._segments[running]) + self._options.lead_ticks
         return self._executed_s + ticks / TICKS_HZ + self._session.limits.silence_s
@@ -333,6 +420,12 @@ class Stream:
                     f"joint {joint} moved by {done:+d} usteps by the device's ledger, the plan has {meant:+d}"
                     f" ({done - meant:+d}); home the arm before the next motion"
                 )
+
+
+def config_of(start_stop_ticks: Sequence[int]) -> Config:
+    """Return the wiring that is the firmware's default, with these start-stop intervals."""
+    told = tuple(start_stop_ticks)
+    return Config(PinMap.OWN, len(told), 0, 0, 0, DEFAULT_WAKE_TICKS, 0, told)
 
 
 def planned_usteps(segments: Sequence[Segment]) -> tuple[int, ...]:

@@ -12,21 +12,23 @@ from planarm_wire.messages import (
     CRC_BYTES,
     HEADER_BYTES,
     HOST_WINDOW_BYTES,
-    QUEUE_SLOTS,
+    QUEUE_BYTES,
     TICKS_HZ,
 )
 
 BITS_PER_BYTE = 10
 """On the line: start bit, eight bits, stop bit."""
 
-STEP_INTERRUPT_TICKS = 104
+STEP_INTERRUPT_TICKS = 79
 LINE_LOAD = 0.1
 READ_TICKS = 15_000
 LATEST_READ_TICKS = 20_000
 LEAST_SHARE = 0.05
+QUEUED_HEAD_BYTES = 2.0
 """What the board takes, measured on the emulator (firmware/README.md, budgets): a step's interrupt; the share of the
 line's interrupts; the main program's work on a segment, from the rates at which it just keeps up (12,000 to 15,000);
-and how long before its start a segment must be there. The last keeps an overloaded board's time finite."""
+and how long before its start a segment must be there. LEAST_SHARE keeps an overloaded board's time finite; the last is
+a segment's share of its frame's head in the queue, two segments a frame as a rule."""
 
 LOAD_WINDOW_TICKS = 80_000
 MOST_LOAD = 0.75
@@ -88,7 +90,7 @@ def _check_peak(table: SegmentTable, link: LinkSpec) -> Check:
 def _check_supply(table: SegmentTable, link: LinkSpec) -> list[Check]:
     """Check that the line brings every segment before it starts, and the board reads it.
 
-    The device holds QUEUE_SLOTS segments, so a segment is sent when the one that many before it has ended. Its main
+    The device holds QUEUE_BYTES of segments, so a segment is sent when those that fill them have begun. Its main
     program reads them one by one in the time that the interrupts of the running segment leave.
     """
     starts: list[int] = table.starts.tolist()
@@ -96,8 +98,11 @@ def _check_supply(table: SegmentTable, link: LinkSpec) -> list[Check]:
     loads: list[float] = _interrupt_loads(table).tolist()
     line_tick = board_tick = 0.0
     line, board = [(float(starts[-1]), 0)], [(float(starts[-1]), 0)]
-    for k in range(QUEUE_SLOTS, len(line_ticks)):  # the others are sent before the start
-        line_tick = max(line_tick, float(starts[k - QUEUE_SLOTS + 1])) + line_ticks[k]
+    before: list[int] = _begun_before(table).tolist()
+    for k, begun in enumerate(before):
+        if begun < 0:
+            continue  # sent before the start
+        line_tick = max(line_tick, float(starts[begun])) + line_ticks[k]
         board_tick = max(board_tick, line_tick)
         running = min(k, bisect_right(starts, board_tick) - 1)
         board_tick += READ_TICKS / max(1.0 - loads[running], LEAST_SHARE)
@@ -112,6 +117,13 @@ def _check_supply(table: SegmentTable, link: LinkSpec) -> list[Check]:
         where = f"segment {k}, {_time(starts[k])}" if len(found) > 1 else ""
         checks.append(at_least(name, ahead_ticks / TICKS_HZ, 0.0, "s", where, setting))
     return checks
+
+
+def _begun_before(table: SegmentTable) -> Ticks:
+    """Return for each segment the last of those that must have begun before the queue has room for it; -1: none."""
+    total = np.concatenate([[0.0], np.cumsum(np.asarray(segment_bytes(table), np.float64) + QUEUED_HEAD_BYTES)])
+    begun: Ticks = np.searchsorted(total, total[1:] - QUEUE_BYTES, side="left") - 1
+    return begun
 
 
 def _interrupt_loads(table: SegmentTable) -> Floats:

@@ -45,6 +45,8 @@ def messages_h(spec: Spec) -> str:
     sections: tuple[tuple[str, str, str, tuple[Code, ...]], ...] = (
         ("states", "uint8_t", "What the device is doing.", spec.states),
         ("faults", "uint8_t", "Why the device stopped its pulses.", spec.faults),
+        ("resets", "uint8_t", "Why the device last started.", spec.resets),
+        ("pin_maps", "uint8_t", "Where the drivers are wired.", spec.pin_maps),
         ("results", "int8_t", "How a command went: 0 done, above 0 send it again, below 0 refused.", spec.results),
     )
     for section, base, doc, entries in sections:
@@ -66,6 +68,9 @@ def _constants(spec: Spec) -> Iterator[str]:
     reserved = ", ".join(f"0x{code:02X}" for code in framing.reserved)
     yield "// Never inside a frame; receivers drop them."
     yield f"constexpr uint8_t RESERVED[{len(framing.reserved)}] = {{{reserved}}};"
+    for code in spec.out_of_band.codes:
+        yield _constant(f"{code.name.upper()}_CODE", "uint8_t", f"0x{code.code:02X}", f"Out of band: {code.doc}")
+        yield _constant(f"{code.name.upper()}_REPEATS", "uint8_t", str(code.repeats), "In a row.")
     yield _constant("CRC_INITIAL", "uint16_t", f"0x{framing.crc_initial:04X}", framing.crc)
     yield _constant("HEADER_BYTES", "uint8_t", str(framing.header_bytes), "Length, seq and type.")
     yield _constant("CRC_BYTES", "uint8_t", str(framing.crc_bytes), "Of each of the two checks.")
@@ -103,7 +108,8 @@ def _enum(name: str, base: str, doc: str, members: Iterable[tuple[str, int, str]
     yield f"\n// {doc}\nenum class {name} : {base} {{"
     for member, code, text in members:
         yield wrapped(sentence(text), "    // ", 100)
-        yield f"    {member.upper()} = {code if code < 10 else hex(code)},"
+        number = str(code) if code < 10 else f"0x{code:X}"
+        yield f"    {member.upper()} = {number},"
     yield "};"
 
 

@@ -97,6 +97,7 @@ def protocol_md(spec: Spec) -> str:
     """Return the text of docs/protocol.md."""
     sections = {
         "Frames": _framing(spec.framing),
+        "Out-of-band bytes": _out_of_band(spec),
         "Sequence": spec.sequence_doc.strip(),
         "Types": _types(),
         "Messages": "\n\n".join(_message(message) for message in spec.messages),
@@ -109,6 +110,10 @@ def protocol_md(spec: Spec) -> str:
         "Board": _board(spec),
         "States": _table(("code", "name", "meaning"), ((str(c.code), c.name, sentence(c.text)) for c in spec.states)),
         "Faults": _codes(spec.faults),
+        "Resets": _table(("code", "name", "meaning"), ((str(c.code), c.name, sentence(c.text)) for c in spec.resets)),
+        "Pin maps": _table(
+            ("code", "name", "meaning"), ((str(c.code), c.name, sentence(c.text)) for c in spec.pin_maps)
+        ),
         "Results": "0 is done, above 0 asks to send again, below 0 is a refusal.\n\n" + _codes(spec.results),
         "Specification hash": _HASH.format(spec_hash=spec.spec_hash),
         "Golden vectors": _VECTORS,
@@ -133,6 +138,11 @@ def _framing(framing: Framing) -> str:
         head=head,
         most=head + framing.max_payload_bytes + framing.crc_bytes,
     )
+
+
+def _out_of_band(spec: Spec) -> str:
+    rows = ((f"0x{c.code:02X}", str(c.repeats), c.name, sentence(c.doc)) for c in spec.out_of_band.codes)
+    return f"{spec.out_of_band.doc.strip()}\n\n{_table(('code', 'in a row', 'name', 'meaning'), rows)}"
 
 
 def _hex_list(codes: Iterable[int]) -> str:

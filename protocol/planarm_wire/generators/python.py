@@ -43,6 +43,8 @@ def messages_py(spec: Spec) -> str:
     sections: dict[str, tuple[str, tuple[Code, ...]]] = {
         "states": ("What the device is doing.", spec.states),
         "faults": ("Why the device stopped its pulses.", spec.faults),
+        "resets": ("Why the device last started.", spec.resets),
+        "pin_maps": ("Where the drivers are wired.", spec.pin_maps),
         "results": ("How a command went: 0 done, above 0 send it again, below 0 refused.", spec.results),
     }
     for section, (doc, codes) in sections.items():
@@ -70,6 +72,10 @@ def _constants(spec: Spec) -> Iterator[str]:
     yield _constant("ESCAPE_XOR", f"0x{framing.escape_xor:02X}", "An escaped byte is its code xor this.")
     reserved = ", ".join(f"0x{code:02X}" for code in framing.reserved)
     yield _constant("RESERVED", f"({reserved})", "Never inside a frame; receivers drop them.")
+    for code in spec.out_of_band.codes:
+        doc = f"Out of band, {code.repeats} in a row: {code.doc}"
+        yield _constant(f"{code.name.upper()}_CODE", f"0x{code.code:02X}", doc)
+        yield _constant(f"{code.name.upper()}_REPEATS", str(code.repeats), "How often in a row the code must come.")
     yield _constant("CRC_INITIAL", f"0x{framing.crc_initial:04X}", framing.crc)
     yield _constant("HEADER_BYTES", str(framing.header_bytes), "Length, seq and type.")
     yield _constant("CRC_BYTES", str(framing.crc_bytes), "Of each of the two checks.")
@@ -86,7 +92,7 @@ def _strings(items: Iterable[str]) -> str:
 
 
 def _constant(name: str, value: str, doc: str) -> str:
-    return f'{name}: Final = {value}\n"""{sentence(doc)}"""\n'
+    return f"{name}: Final = {value}\n{_docstring(sentence(doc), '')}"
 
 
 def _docstring(text: str, indent: str, more: str = "") -> str:
@@ -101,10 +107,13 @@ def _docstring(text: str, indent: str, more: str = "") -> str:
 
 def _enum(name: str, doc: str, members: Iterable[tuple[str, int, str]]) -> str:
     body = "".join(
-        f"    {member.upper()} = {code if code < 10 else hex(code)}\n" + _docstring(sentence(text), "    ")
-        for member, code, text in members
+        f"    {member.upper()} = {_code(code)}\n" + _docstring(sentence(text), "    ") for member, code, text in members
     )
     return f'\n\nclass {name}(IntEnum):\n    """{doc}"""\n\n{body}'
+
+
+def _code(code: int) -> str:
+    return str(code) if code < 10 else f"0x{code:X}"
 
 
 def _words(enum: str, codes: Iterable[Code]) -> str:
@@ -156,7 +165,7 @@ def _tables(spec: Spec) -> str:
     }
     parts = ["\n"]
     for alias, names in groups.items():
-        parts.append(f"\n{alias}: TypeAlias = {' | '.join(class_name(name) for name in names)}")
+        parts.append(_alias(alias, [class_name(name) for name in names]))
     parts.append("\nMessage: TypeAlias = HostMessage | DeviceMessage\n")
     rows = "".join(f"    {class_name(m.name)}.TYPE: {class_name(m.name)},\n" for m in spec.messages)
     parts.append(f'\nMESSAGES: Final[dict[int, type[Message]]] = {{\n{rows}}}\n"""The class for each type code."""\n')
@@ -165,6 +174,13 @@ def _tables(spec: Spec) -> str:
     parts.append(f"\nLAYOUTS: Final[dict[type[Message | Struct], tuple[Field, ...]]] = {{\n{rows}}}\n")
     parts.append('"""The fields of each message and struct, in the order of the wire."""\n')
     return "".join(parts)
+
+
+def _alias(alias: str, names: list[str]) -> str:
+    line = f"\n{alias}: TypeAlias = {' | '.join(names)}"
+    if len(line) <= 121:
+        return line
+    return f"\n{alias}: TypeAlias = (\n    " + "\n    | ".join(names) + "\n)"
 
 
 def _layout(item: StructSpec | MessageSpec) -> str:

@@ -25,6 +25,14 @@ _RAMP_DOWN: Final = m.Move(2 * 4, 0, (1000 << 16) + 1, 0x8001)
 _ALL_STUFFED: Final = m.Move(0x7D, 0x7C, 0x7B, 0x3E)  # the last is 0x7C after zigzag
 _EXTREME: Final = m.Move(2 * m.MAX_SEGMENT_STEPS + 1, m.MAX_SEGMENT_TICKS, m.MAX_INTERVAL_TICKS << 16, -(2**31))
 
+
+_AT_ZERO: Final = m.Ledger(0, (0, 0))
+
+
+def _status(state: m.State, *, free_bytes: int, mcu_ticks: int = 0, ledger: m.Ledger = _AT_ZERO) -> m.Status:
+    return m.Status(state, m.Fault.NONE, 0, m.Result.OK, 0, free_bytes, 0, 0, 0, 0, 0, 100, 100, mcu_ticks, ledger)
+
+
 _SEGMENTS: Final[tuple[m.Segment, ...]] = (
     m.Segment(2 * 20_000, (_REST, _REST)),
     m.Segment(2 * 20_000 + 1, (m.Move(1), m.Move(3, 19_999))),
@@ -42,28 +50,48 @@ _MESSAGES: Final[tuple[m.Message, ...]] = (
     m.Query(),
     m.Enable(0),
     m.Enable(1),
-    *(m.Segments((segment,)) for segment in _SEGMENTS),
-    m.Segments((_SEGMENTS[0],) * 9),
-    m.Segments((m.Segment(2 * m.MAX_SEGMENT_TICKS + 1, (_EXTREME, _EXTREME)),)),
-    m.Segments((m.Segment(0x7E, (_ALL_STUFFED, _ALL_STUFFED)),) * 5),
+    *(m.Segments(0x7D, 0xFF, 3, (segment,)) for segment in _SEGMENTS),
+    m.Segments(0, 0, 0, (_SEGMENTS[0],) * 9),
+    m.Segments(0xFF, 0, 0xFF, (m.Segment(2 * m.MAX_SEGMENT_TICKS + 1, (_EXTREME, _EXTREME)),)),
+    m.Segments(0x7E, 0x7B, 0x7C, (m.Segment(0x7E, (_ALL_STUFFED, _ALL_STUFFED)),) * 5),
     m.Start(m.MIN_LEAD_TICKS),
     m.Start(0xFFFFFFFF),
     m.Clear(),
-    m.Welcome(m.PROTOCOL_VERSION, 1, 2, 0x01234567, (1, 2, 3), m.Ledger(0, (0, 0))),
+    m.Resume(),
+    m.Override(100),
+    m.Stop(1),
+    m.Config(m.PinMap.OWN, m.JOINTS, 0b10, 0b111, 60_000, 160_000, 56, (160_000, _STUFFED_U32)),
+    m.SoftLimits((-(2**31), 0), (2**31 - 1, -1)),
+    m.Home(1, 1, 8_000, 40_000, 20_000, 400, -_STUFFED_U32),
+    m.SetPosition((-1, _STUFFED_U32)),
+    m.Welcome(m.PROTOCOL_VERSION, 1, 2, 0x01234567, (1, 2, 3), m.Reset.POWER_ON, 0, m.JOINTS, m.Ledger(0, (0, 0))),
     m.Welcome(
-        0xFF, _STUFFED_U32, _STUFFED_U32, _STUFFED_U32, (125, 126, 255), m.Ledger(2**32 - 1, (-(2**31), 2**31 - 1))
+        0xFF,
+        _STUFFED_U32,
+        _STUFFED_U32,
+        _STUFFED_U32,
+        (125, 126, 255),
+        m.Reset.WATCHDOG,
+        1,
+        0x7D,
+        m.Ledger(2**32 - 1, (-(2**31), 2**31 - 1)),
     ),
-    m.Status(m.State.IDLE, m.Fault.NONE, m.Result.OK, 0, m.QUEUE_SLOTS, 0, 0, 0, 0, m.Ledger(0, (0, 0))),
-    m.Status(m.State.RUNNING, m.Fault.NONE, m.Result.OK, 0, 7, 1, 0, 0, 123_456_789, m.Ledger(40, (-3, 16_000))),
+    _status(m.State.IDLE, free_bytes=m.QUEUE_BYTES - m.QUEUE_FRAME_BYTES),
+    _status(m.State.RUNNING, free_bytes=7, mcu_ticks=123_456_789, ledger=m.Ledger(40, (-3, 16_000))),
     m.Status(
         m.State.FAULT,
         m.Fault.UNDERRUN,
+        0x7B,
         m.Result.VERSION,
         0x7E,
+        0x7D7E,
         0x7D,
         0x7B,
         0x7C,
         0xFF,
+        0x83,
+        100,
+        99,
         2**32 - 1,
         m.Ledger(_STUFFED_U32, (-1, _STUFFED_U32)),
     ),
@@ -73,12 +101,13 @@ _BAD_PAYLOADS: Final[tuple[tuple[int, str, str], ...]] = (
     (0x01, "0100000000ff", "left over"),
     (0x01, "01000000", "too short"),
     (0x02, "00", "left over"),
-    (0x04, "", "no segment"),
-    (0x04, "80000000", "a number in more bytes than it needs"),
-    (0x04, "ffffffff1f0000", "a number over 32 bits"),
-    (0x04, "ffffffffff0f0000", "a number that goes on after 5 bytes"),
-    (0x04, "c0b80202", "ends inside a move"),
-    (0x04, "c0b8020000c0", "ends inside the second segment"),
+    (0x04, "", "no head"),
+    (0x04, "000000", "no segment"),
+    (0x04, "00000080000000", "a number in more bytes than it needs"),
+    (0x04, "000000ffffffff1f0000", "a number over 32 bits"),
+    (0x04, "000000ffffffffff0f0000", "a number that goes on after 5 bytes"),
+    (0x04, "000000c0b80202", "ends inside a move"),
+    (0x04, "000000c0b8020000c0", "ends inside the second segment"),
     (0x7F, "", "no such message"),
 )
 

@@ -1,0 +1,122 @@
+#include "home.h"
+
+#include "inputs.h"
+#include "motion.h"
+#include "segment.h"
+#include "step_engine.h"
+
+namespace planarm {
+namespace home {
+
+namespace {
+
+enum class Phase : uint8_t { NONE, APPROACH, BACK, TOUCH };
+
+// Steps are handed over one by one, this long ahead, so that little is left to be dropped at the switch.
+constexpr int32_t AHEAD_TICKS = 30000;
+constexpr uint32_t NEAR_TICKS = 32000;
+// Between two phases the joint stands still.
+constexpr uint32_t PAUSE_TICKS = 1600000;
+
+Order order;
+Phase phase = Phase::NONE;
+uint32_t steps_left;
+uint32_t next_ticks;  // of the next step
+bool first_step;
+bool touched;  // the switch closed and may be bouncing
+int32_t touched_usteps;
+
+void enter(Phase next, uint32_t steps, uint32_t start_ticks) {
+    phase = next;
+    steps_left = steps;
+    next_ticks = start_ticks;
+    first_step = true;
+    touched = false;
+}
+
+uint32_t interval_ticks() { return phase == Phase::APPROACH ? order.fast_ticks : order.slow_ticks; }
+
+// False when all steps of the phase were made.
+bool feed(uint32_t now_ticks) {
+    if (static_cast<int32_t>(next_ticks - now_ticks) > AHEAD_TICKS) return true;
+    if (steps_left == 0) return static_cast<int32_t>(next_ticks - now_ticks) > 0;
+    if (!step_engine::has_room(order.joint)) return true;
+    const uint32_t interval = interval_ticks();
+    step_engine::Piece piece;
+    piece.first_ticks = next_ticks;
+    piece.interval_q16 = piece.add_q16 = 0;
+    piece.fraction = 0;
+    piece.steps = 1;
+    piece.positive = phase == Phase::BACK ? !order.positive : order.positive;
+    piece.near = !first_step && interval <= NEAR_TICKS;
+    step_engine::append(order.joint, piece);
+    first_step = false;
+    next_ticks += interval;
+    --steps_left;
+    return true;
+}
+
+int32_t position() { return step_engine::position().usteps[order.joint]; }
+
+// Where the contact closed, before it bounced.
+void note_touch() {
+    const bool now = inputs::is_hit_now(order.joint);
+    if (now && !touched) touched_usteps = position();
+    touched = now || (touched && inputs::is_bouncing(order.joint));
+}
+
+void finish() {
+    const int32_t beyond = position() - touched_usteps;
+    motion::set_position(order.joint, order.position_usteps + beyond);
+    phase = Phase::NONE;
+}
+
+}  // namespace
+
+void reset() { phase = Phase::NONE; }
+
+wire::Result check(const Order& told) {
+    const bool slow_enough = told.fast_ticks >= MIN_REVERSAL_TICKS && told.slow_ticks >= told.fast_ticks;
+    const bool short_enough = told.slow_ticks <= wire::MAX_SEGMENT_TICKS;
+    const bool good = told.joint < wire::JOINTS && slow_enough && short_enough && told.back_usteps != 0;
+    return good ? wire::Result::OK : wire::Result::OUT_OF_RANGE;
+}
+
+void begin(const Order& told, uint32_t start_ticks) {
+    order = told;
+    if (inputs::is_hit(order.joint)) {
+        enter(Phase::BACK, order.back_usteps, start_ticks);
+    } else {
+        enter(Phase::APPROACH, order.most_usteps, start_ticks);
+    }
+}
+
+void cancel() { phase = Phase::NONE; }
+
+bool is_active() { return phase != Phase::NONE; }
+
+uint8_t joint() { return order.joint; }
+
+Progress serve(uint32_t now_ticks) {
+    if (phase == Phase::NONE) return Progress::NONE;
+    if (!step_engine::serve(now_ticks)) return Progress::MISSED;
+    note_touch();
+    const bool hit = inputs::is_hit(order.joint);
+    const bool there = phase == Phase::BACK ? !hit : hit;
+    if (!there) return feed(now_ticks) ? Progress::GOING : Progress::FAILED;
+    step_engine::stop();
+    switch (phase) {
+        case Phase::APPROACH:
+            enter(Phase::BACK, order.back_usteps, now_ticks + PAUSE_TICKS);
+            return Progress::GOING;
+        case Phase::BACK:
+            enter(Phase::TOUCH, order.back_usteps, now_ticks + PAUSE_TICKS);
+            return Progress::GOING;
+        default:
+            finish();
+            return Progress::DONE;
+    }
+}
+
+}  // namespace home
+}  // namespace planarm

@@ -1,0 +1,59 @@
+#include "inputs.h"
+
+#include "hal_pins.h"
+#include "power.h"
+
+namespace planarm {
+namespace inputs {
+
+namespace {
+
+uint8_t raw;     // bit j: joint j, hit
+uint8_t steady;  // debounced
+uint32_t changed_ticks;
+
+uint8_t read() {
+    uint8_t bits = hal::inputs();
+    if (power::has_option(power::LIMITS_OPEN_WHEN_HIT)) bits ^= static_cast<uint8_t>(~hal::STOP_INPUT_OPEN);
+    return bits;
+}
+
+constexpr uint8_t JOINTS_MASK = (1 << wire::JOINTS) - 1;
+
+bool is_set(uint8_t bits, uint8_t joint) { return ((bits >> joint) & 1) != 0; }
+
+}  // namespace
+
+void reset(uint32_t now_ticks) {
+    raw = steady = static_cast<uint8_t>(read() & JOINTS_MASK);
+    changed_ticks = now_ticks;
+}
+
+void serve(uint32_t now_ticks) {
+    const uint8_t now = static_cast<uint8_t>(read() & JOINTS_MASK);
+    if (now != raw) {
+        raw = now;
+        changed_ticks = now_ticks;
+    } else if (steady != raw && now_ticks - changed_ticks >= wire::DEBOUNCE_TICKS) {
+        steady = raw;
+    }
+}
+
+bool is_hit(uint8_t joint) { return is_set(steady, joint); }
+
+bool is_hit_now(uint8_t joint) { return is_set(read(), joint); }
+
+bool is_bouncing(uint8_t joint) { return is_set(static_cast<uint8_t>(raw ^ steady), joint); }
+
+uint8_t hit_joint() {
+    if (!power::has_option(power::LIMIT_SWITCHES)) return wire::JOINTS;
+    for (uint8_t joint = 0; joint < wire::JOINTS; ++joint) {
+        if (is_hit(joint)) return joint;
+    }
+    return wire::JOINTS;
+}
+
+uint8_t report() { return static_cast<uint8_t>(steady | (hal::inputs() & hal::STOP_INPUT_OPEN)); }
+
+}  // namespace inputs
+}  // namespace planarm

@@ -1,0 +1,78 @@
+#include "hal_math.h"
+
+namespace hal {
+
+// a in r25 to r22, b in r21 and r20; high in r21 to r18, low in r23 and r22. The bytes of the product come up
+// in r30, r31, r18 to r21.
+__attribute__((naked, noinline)) Fixed48 multiply(uint32_t, uint16_t) {
+    __asm__ __volatile__(
+        R"(
+        movw r26, r20
+        mul  r22, r26
+        movw r30, r0
+        mul  r22, r27
+        clr  r22                        ; 0 from here on
+        add  r31, r0
+        mov  r18, r1
+        adc  r18, r22
+        mul  r24, r26
+        add  r18, r0
+        mov  r19, r1
+        adc  r19, r22
+        mul  r25, r27
+        movw r20, r0
+        mul  r23, r26
+        add  r31, r0
+        adc  r18, r1
+        adc  r19, r22
+        adc  r20, r22
+        adc  r21, r22
+        mul  r23, r27
+        add  r18, r0
+        adc  r19, r1
+        adc  r20, r22
+        adc  r21, r22
+        mul  r24, r27
+        add  r19, r0
+        adc  r20, r1
+        adc  r21, r22
+        mul  r25, r26
+        add  r19, r0
+        adc  r20, r1
+        adc  r21, r22
+        clr  r1
+        movw r22, r30
+        ret
+        )");
+}
+
+// Long division, bit by bit: the quotient's bits enter where the dividend's leave. a in r25 to r22, b in r20;
+// the sixteen bits behind a are r27 and r26, what is left over is r21.
+__attribute__((naked, noinline)) uint32_t divide_q16(uint32_t, uint8_t) {
+    __asm__ __volatile__(
+        R"(
+        clr  r26
+        clr  r27
+        clr  r21
+        ldi  r30, 48
+    1:  lsl  r26
+        rol  r27
+        rol  r22
+        rol  r23
+        rol  r24
+        rol  r25
+        rol  r21
+        brcs 2f
+        cp   r21, r20
+        brcs 3f
+    2:  sub  r21, r20
+        inc  r26
+    3:  dec  r30
+        brne 1b
+        movw r24, r22
+        movw r22, r26
+        ret
+        )");
+}
+
+}  // namespace hal

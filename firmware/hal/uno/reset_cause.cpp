@@ -1,0 +1,48 @@
+#include "reset_cause.h"
+
+#include <avr/interrupt.h>
+#include <avr/io.h>
+#include <avr/wdt.h>
+
+#include "hal_signals.h"
+
+// Written by early_pins (main.cpp) before memory is set up.
+__attribute__((section(".noinit"))) uint8_t reset_flags;
+
+namespace hal {
+
+namespace {
+
+using planarm::wire::Reset;
+
+// Memory holds these after a start of this firmware, and by chance only after power-on.
+constexpr uint32_t RUNNING = 0x706C616E;
+constexpr uint32_t STOOD_STILL = 0x61726D21;
+
+__attribute__((section(".noinit"))) uint32_t trace;
+
+}  // namespace
+
+Reset find_reset_cause() {
+    const uint32_t left = trace;
+    trace = RUNNING;
+    if ((reset_flags & _BV(PORF)) != 0) return Reset::POWER_ON;
+    if ((reset_flags & _BV(BORF)) != 0) return Reset::BROWN_OUT;
+    if (left == STOOD_STILL || (reset_flags & _BV(WDRF)) != 0) return Reset::WATCHDOG;
+    if ((reset_flags & _BV(EXTRF)) != 0) return Reset::EXTERNAL;
+    return left == RUNNING ? Reset::UNKNOWN : Reset::POWER_ON;
+}
+
+// 250 ms twice: interrupt, then reset (ATmega328P datasheet, 10.8.2).
+void watchdog_start() {
+    static_assert(planarm::wire::WATCHDOG_MS == 250, "the prescaler below");
+    wdt_reset();
+    WDTCSR = _BV(WDCE) | _BV(WDE);
+    WDTCSR = _BV(WDIE) | _BV(WDE) | _BV(WDP2);
+}
+
+void watchdog_feed() { wdt_reset(); }
+
+}  // namespace hal
+
+ISR(WDT_vect) { hal::trace = hal::STOOD_STILL; }

@@ -1,0 +1,263 @@
+"""Emergency stop, stop input, limit switches, soft limits, homing, power: each with its stated outcome, on the pins."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from firmware_board import (
+    LEAD_TICKS,
+    WAKE_TICKS,
+    Board,
+    EmulatedFirmware,
+    Firmware,
+    NativeFirmware,
+    end_motion,
+    run_of,
+    segment_of,
+)
+from planarm_wire.messages import (
+    BAUD,
+    DEBOUNCE_TICKS,
+    EMERGENCY_CODE,
+    EMERGENCY_REPEATS,
+    ENABLE_PIN,
+    JOINTS,
+    STEP_PINS,
+    Clear,
+    Config,
+    Enable,
+    Fault,
+    Home,
+    PinMap,
+    Query,
+    Result,
+    Segments,
+    SetPosition,
+    SoftLimits,
+    Start,
+    State,
+)
+
+BYTE_TICKS = 10 * 16_000_000 // BAUD
+MOST_TICKS_AFTER_STOP = 480  # 30 us
+ACTIVE_HIGH, RELEASES, STOP_INPUT, LIMITS, OPENS = 1, 2, 4, 8, 16
+WIRING = Config(PinMap.OWN, JOINTS, 0, 0, 0, 160_000, 0, (160_000, 160_000))
+
+
+def configured(firmware: Firmware, **changes: int) -> Board:
+    board = Board(firmware)
+    board.hello()
+    status = board.ask(replace(WIRING, **changes))
+    assert status.refusal is Result.OK
+    board.ask(Enable(1))
+    board.run(WAKE_TICKS)
+    return board
+
+
+def moving(board: Board) -> None:
+    """Both joints at 50,000 and 31,000 steps/s for 60 ms."""
+    motion = end_motion(
+        [segment_of(96_000, run_of(299, first=0, interval=320), run_of(180, first=0, interval=520))] * 10
+    )
+    for segment in motion:
+        board.ask(Segments(0, 0, 0, (segment,)))
+    board.send(Start(LEAD_TICKS))
+    board.run(300_000)
+    assert board.rises(0)
+
+
+@pytest.mark.parametrize("phase", range(0, 320, 40))
+def test_three_emergency_bytes_end_all_edges_within_30_us(emulated_firmware: EmulatedFirmware, phase: int) -> None:
+    board = configured(emulated_firmware)
+    moving(board)
+    board.run(phase)
+    board.receive(bytes([EMERGENCY_CODE] * EMERGENCY_REPEATS))
+    on_line = board.now
+    board.run(100_000)
+    # The bytes follow each other without a gap from here on; the last stop bit ends three bytes later.
+    stopped = on_line + EMERGENCY_REPEATS * BYTE_TICKS
+    last = max(edge.tick for edge in board.edges if edge.pin in STEP_PINS)
+    assert stopped - 3 * BYTE_TICKS < last <= stopped + MOST_TICKS_AFTER_STOP
+    status = board.ask()
+    assert (status.state, status.fault) == (State.FAULT, Fault.EMERGENCY_STOP)
+    assert board.edges[-1].pin != ENABLE_PIN, "the drivers keep holding"
+
+
+def test_two_emergency_bytes_and_another_do_nothing(firmware: Firmware) -> None:
+    board = configured(firmware)
+    moving(board)
+    for _ in range(4):
+        board.receive(bytes([EMERGENCY_CODE] * (EMERGENCY_REPEATS - 1)))
+        board.send(Query())
+        board.run(40_000)
+    assert board.ask_now().fault is Fault.NONE
+
+
+def test_an_emergency_in_the_middle_of_a_frame_and_with_a_full_ring(firmware: Firmware) -> None:
+    board = configured(firmware)
+    moving(board)
+    board.receive(bytes(100) + bytes([EMERGENCY_CODE] * EMERGENCY_REPEATS))
+    board.run(200_000)
+    made = len(board.rises(0))
+    board.run(200_000)
+    assert len(board.rises(0)) == made
+    board.receive(bytes([0x7E]))
+    board.run(100_000)
+    assert board.ask().fault is Fault.EMERGENCY_STOP
+    assert board.ask(Clear()).fault is Fault.NONE
+
+
+def test_an_emergency_releases_the_drivers_when_told_to(firmware: Firmware) -> None:
+    board = configured(firmware, options=RELEASES)
+    moving(board)
+    board.receive(bytes([EMERGENCY_CODE] * EMERGENCY_REPEATS))
+    board.run(100_000)
+    levels = [edge.level for edge in board.edges if edge.pin == ENABLE_PIN]
+    assert levels == [0, 1]
+
+
+def test_active_high_enable_and_inverted_dir(native_firmware: NativeFirmware) -> None:
+    board = configured(native_firmware, options=ACTIVE_HIGH, dir_inverted=0b01)
+    board.edges.clear()
+    status = board.stream(end_motion([segment_of(30_000, run_of(5), run_of(5))]))
+    assert status.ledger.position_usteps == (5, 5)
+    assert [(e.pin, e.level) for e in board.edges if e.pin == "D5"] == [("D5", 1)]
+    assert [e for e in board.edges if e.pin == "D4"] == [], "low is the positive direction of joint 1"
+    assert board.ask(Enable(0)).state is State.IDLE
+    assert [e.level for e in board.edges if e.pin == ENABLE_PIN] == [0]
+
+
+def test_segments_outside_the_soft_limits_are_a_fault_that_says_which(firmware: Firmware) -> None:
+    board = configured(firmware)
+    board.ask(SoftLimits((-100, -5), (100, 5)))
+    assert board.ask(Segments(0, 0, 0, (segment_of(30_000, run_of(9), run_of(5)),))).fault is Fault.NONE
+    status = board.ask(Segments(0, 0, 0, (segment_of(30_000, run_of(9), run_of(1)),)))
+    assert (status.state, status.fault, status.detail) == (State.FAULT, Fault.SOFT_LIMIT, 1)
+    assert board.motion_edges() == []
+
+
+def test_the_position_is_told_at_rest_only(firmware: Firmware) -> None:
+    board = configured(firmware)
+    assert board.ask(SetPosition((-70_000, 12))).ledger.position_usteps == (-70_000, 12)
+    board.ask(Segments(0, 0, 0, (segment_of(30_000, run_of(9)),)))
+    assert board.ask(SetPosition((0, 0))).refusal is Result.WRONG_STATE
+
+
+def test_idle_drivers_are_released(native_firmware: NativeFirmware) -> None:
+    board = configured(native_firmware, idle_ms=100)
+    board.run(16_000 * 50)
+    assert board.ask().state is State.READY
+    board.run(16_000 * 80)
+    assert board.ask().state is State.IDLE
+
+
+def test_the_first_step_waits_until_the_drivers_are_awake(native_firmware: NativeFirmware) -> None:
+    board = Board(native_firmware)
+    board.hello()
+    board.ask(replace(WIRING, wake_ticks=2_000_000))
+    board.ask(Enable(1))
+    energised = board.edges[-1].tick
+    board.ask(Segments(0, 0, 0, (segment_of(30_000, run_of(5), last=True),)))
+    board.ask(Start(LEAD_TICKS))
+    board.run(3_000_000)
+    assert board.rises(0)[0] >= energised + 2_000_000
+
+
+class Switches:
+    """The inputs of either board; by default nothing is hit and the stop circuit is closed."""
+
+    def __init__(self, firmware: Firmware) -> None:
+        self.firmware = firmware
+        self.set()
+
+    def set(self, hit: int = 0, stop_open: bool = False) -> None:
+        if isinstance(self.firmware, NativeFirmware):
+            self.firmware.set_inputs(hit | (0x80 if stop_open else 0))
+            return
+        assert isinstance(self.firmware, EmulatedFirmware)
+        uno = self.firmware.uno
+        uno.pin("A0").drive(1 if stop_open else 0)
+        for joint, pin in enumerate(("A1", "A2")):
+            uno.pin(pin).drive(0 if hit >> joint & 1 else 1)
+
+
+def test_the_stop_input_ends_all_edges(firmware: Firmware) -> None:
+    board = Board(firmware)
+    switches = Switches(firmware)
+    board.hello()
+    board.ask(replace(WIRING, options=STOP_INPUT))
+    board.ask(Enable(1))
+    board.run(WAKE_TICKS)
+    moving(board)
+    switches.set(stop_open=True)
+    opened = board.now
+    board.run(100_000)
+    assert max(edge.tick for edge in board.edges if edge.pin in STEP_PINS) <= opened + MOST_TICKS_AFTER_STOP
+    assert board.ask().fault is Fault.STOP_INPUT
+    board.ask(Clear())
+    assert board.ask(Enable(1)).fault is Fault.STOP_INPUT, "it is still open"
+    switches.set()
+    board.ask(Clear())
+    assert board.ask(Enable(1)).state is State.READY
+
+
+def test_a_limit_hit_in_motion_is_a_fault_that_says_which_and_a_bounce_is_none(firmware: Firmware) -> None:
+    board = Board(firmware)
+    switches = Switches(firmware)
+    board.hello()
+    board.ask(replace(WIRING, options=LIMITS))
+    board.ask(Enable(1))
+    board.run(WAKE_TICKS)
+    moving(board)
+    for _ in range(3):
+        switches.set(hit=0b10)
+        board.run(DEBOUNCE_TICKS // 4)
+        switches.set()
+        board.run(DEBOUNCE_TICKS // 4)
+    assert board.ask_now().fault is Fault.NONE
+    switches.set(hit=0b10)
+    board.run(DEBOUNCE_TICKS + 60_000)
+    status = board.ask()
+    assert (status.fault, status.detail, status.inputs & 3) == (Fault.LIMIT_SWITCH, 1, 0b10)
+    assert status.ledger.position_usteps[0] == board.position_at(0, board.now)
+
+
+@pytest.mark.parametrize("begins_on_the_switch", [False, True])
+def test_homing_finds_the_place_where_the_switch_closes(firmware: Firmware, begins_on_the_switch: bool) -> None:
+    # The switch closes at -40 usteps of joint 2 from here; the position there shall be 1000.
+    closes_at = 5 if begins_on_the_switch else -40
+    board = Board(firmware)
+    switches = Switches(firmware)
+    board.hello()
+    board.ask(replace(WIRING, options=LIMITS))
+    board.ask(Enable(1))
+    switches.set(hit=0b10 if begins_on_the_switch else 0)
+    board.run(WAKE_TICKS)
+    assert board.ask(Home(1, 0, 20_000, 100_000, 200, 100, 1000)).state is State.HOMING
+    for _ in range(20_000):
+        board.run(2000)
+        place = board.position_at(1, board.now)
+        switches.set(hit=0b10 if place <= closes_at else 0)
+        if board.replies and board.replies[-1][1].state is not State.HOMING:  # type: ignore[union-attr]
+            break
+    status = board.ask()
+    assert (status.state, status.fault) == (State.READY, Fault.NONE)
+    assert abs(status.ledger.position_usteps[1] - (board.position_at(1, board.now) - closes_at + 1000)) <= 1
+    assert status.ledger.position_usteps[0] == 0
+
+
+def test_homing_without_a_switch_fails_within_its_distance(firmware: Firmware) -> None:
+    board = Board(firmware)
+    switches = Switches(firmware)
+    board.hello()
+    board.ask(replace(WIRING, options=LIMITS))
+    board.ask(Enable(1))
+    switches.set()
+    board.run(WAKE_TICKS)
+    board.ask(Home(0, 1, 20_000, 100_000, 30, 100, 0))
+    board.run(30 * 20_000 + 200_000)
+    status = board.ask()
+    assert (status.state, status.fault, status.detail) == (State.FAULT, Fault.HOMING_FAILED, 0)
+    assert status.ledger.position_usteps == (30, 0)
