@@ -58,8 +58,8 @@ def test_a_corner_is_cut_as_far_as_the_tolerance_says(tolerance_cm):
 
 def test_a_cut_takes_at_most_half_a_leg():
     path = tip_path([(40.0, 0.0), (40.0, 2.0), (38.0, 2.0), (38.0, 12.0)], tolerance_cm=5.0)
-    # Corners at s = 2 and 4; the middle leg of 2 cm is shared, 1 cm to each.
-    assert path.borders_s.tolist() == pytest.approx([0.0, 1.0, 3.0, 5.0, 14.0])
+    # Corners at s = 2 and 4; the middle leg of 2 cm is shared, 0.998 cm to each.
+    assert path.borders_s.tolist() == pytest.approx([0.0, 1.002, 2.998, 3.002, 4.998, 14.0])
 
 
 def test_one_point_is_a_path_without_motion():

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from motion_paths import JointCurve, joint_line, tip_path
-from planarm.trajectory.check import limit_use
+from planarm.trajectory.check import between, limit_use
 from planarm.trajectory.limits import Limits
 from planarm.trajectory.motion import Trajectory
 
@@ -67,3 +67,9 @@ def test_each_interval_sees_its_own_side_of_a_border():
         inside = np.abs(path.evaluate(np.linspace(a + 1e-9, b - 1e-9, 2001)).ddq_rad).max(axis=0)
         assert use[k] == pytest.approx(inside, rel=0.02)
     assert use[1].max() > 3.0 * use[[0, 2]].max()
+
+
+def test_rounding_at_rest_makes_no_negative_square():
+    # 0.0017598... / 10 * 10 rounds past 0 with some starts; the root of a negative number would be NaN.
+    starts = np.random.default_rng(0).uniform(0.0, 0.01, 20_000)
+    assert min(between(start, 0.0, p / 10) for start in starts for p in (9, 10)) >= 0.0

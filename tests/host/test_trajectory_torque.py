@@ -68,8 +68,9 @@ def random_path(seed):
 def torque_use(trajectory, scene, share, torque_share, count=4001):
     """Use of what gravity and friction leave, by inverse dynamics of differences of positions; own pull-out formula."""
     load = Load.of(scene, torque_share)
-    t_s = np.linspace(0.0, trajectory.duration_s, count)[1:-1]
-    h = 1e-5
+    t_s, h = np.linspace(0.0, trajectory.duration_s, count)[1:-1], 1e-5
+    # Accelerations and friction jump at gridpoints only; differences across a jump mix both sides.
+    t_s = t_s[np.abs(t_s[:, None] - trajectory.t_s).min(axis=1) > 2.0 * h]
     q, ahead, behind = (trajectory.sample(t_s + d)[0] for d in (0.0, h, -h))
     qd, qdd = (ahead - behind) / (2 * h), (ahead - 2 * q + behind) / h**2
     use = np.zeros((len(t_s), 2))
@@ -108,8 +109,7 @@ def test_the_true_torque_is_kept_everywhere_and_used(name, seed):
     path = random_path(seed)
     made = fastest_motion(path, Limits.of_joints(scene.joints, 0.8, Load.of(scene, 0.5)))
     use = torque_use(made, scene, 0.8, 0.5)
-    # Differences across a jump of acceleration mix both sides, and angles are rounded: 1e-16 / 1e-10.
-    assert use.max() <= 1.002
+    assert use.max() <= 1.0005  # angles are rounded: 1e-16 / (1e-5)^2
     assert np.median(use.max(axis=1)) > 0.97
 
 

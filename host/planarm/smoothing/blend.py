@@ -2,8 +2,8 @@
 
 A corner between two legs is cut by the quadratic Bezier curve that leaves the legs at equal distances d from it;
 its control point is the corner. With unit vectors u and v along the legs it comes within d |v - u| / 4 of the corner,
-so a tolerance for that distance gives the largest d. Each leg is shared by the corners at its two ends, half to each.
-A curve that cannot be proved free is tried with half of d, and so on; a corner left sharp is a stop.
+so a tolerance for that distance gives the largest d. Each leg is shared by the corners at its two ends, nearly half to
+each. A curve that cannot be proved free is tried with half of d, and so on; a corner left sharp is a stop.
 """
 
 from math import acos, atan2, floor, pi, sqrt
@@ -21,6 +21,10 @@ DEFAULT_TOLERANCE_CM = 0.5
 
 SMALLEST_LEG_CM = 0.01
 """A corner that leaves room for shorter legs only is left sharp: running through it would be nearly a stop anyway."""
+
+LEG_SHARE = 0.499
+"""Share of a leg that a corner may take. Two halves would leave pieces as short as the legs' lengths are rounded, in
+which the path's acceleration drowns in rounding."""
 
 STRAIGHT = 1e-9
 """Sine of the largest turn between legs that count as one."""
@@ -54,7 +58,7 @@ def blend_corners(path: Path, free_map: FreeMap, tolerance_cm: float | None = DE
     cuts = np.zeros(len(corners))
     if tolerance_cm is not None:
         for k in range(1, len(corners) - 1):
-            largest = 0.5 * min(lengths[k - 1], lengths[k])
+            largest = LEG_SHARE * min(lengths[k - 1], lengths[k])
             cuts[k] = _proved_cut(corners[k], units[k - 1], units[k], largest, tolerance_cm, free_map)
     return _assemble(links, corners, units, lengths, cuts, arm.turn_start_rad)
 

@@ -14,6 +14,7 @@ import numpy as np
 
 from planarm.errors import NoPathError
 from planarm.model.arm import Arm
+from planarm.smoothing.blend import LEG_SHARE
 from planarm.smoothing.joint_spline import JointSpline
 from planarm.smoothing.smooth_path import Floats
 from planarm.workspace.joint_proof import JointWorld, prove_joint_line, prove_pieces
@@ -106,7 +107,7 @@ def _proved_cut(polygon: _Polygon, k: int, arm: Arm, world: JointWorld, toleranc
     if u @ v < TURNING_BACK:
         return 0.0
     levers_cm = np.cumsum(arm.link_lengths_cm[::-1])[::-1]
-    cut = 0.5 * float(min(polygon.lengths[k - 1], polygon.lengths[k]))
+    cut = LEG_SHARE * float(min(polygon.lengths[k - 1], polygon.lengths[k]))
     cut = min(cut, 4.0 * tolerance_cm / float(np.abs(v - u) @ levers_cm))
     while cut >= SMALLEST_CUT_RAD:
         piece = np.zeros((1, 4, arm.links))

@@ -90,7 +90,7 @@ def _kinematic_use(
         u = (x[i + 1] - x[i]) / (2.0 * lengths[i])
         for j in range(dq.shape[2]):
             for p in range(points):
-                at = x[i] + (x[i + 1] - x[i]) * p / (points - 1)  # the square of the rate is linear in s
+                at = between(x[i], x[i + 1], p / (points - 1))
                 speed2[p] = dq[i, p, j] ** 2 * at / speeds[j] ** 2
                 acceleration[p] = (dq[i, p, j] * u + ddq[i, p, j] * at) / accelerations[j]
                 nearest[i, p] = max(nearest[i, p], sqrt(speed2[p]), abs(acceleration[p]))
@@ -111,13 +111,19 @@ def _torque_use(
         for m in range(torque_use.shape[1]):
             for p in range(points):
                 row = i * points + p
-                at = x[i] + (x[i + 1] - x[i]) * p / (points - 1)
+                at = between(x[i], x[i + 1], p / (points - 1))
                 moving = a[row, m] * u + b[row, m] * at + v[row, m] * sqrt(at)
                 held = h[row, m] if moving > 0.0 else -h[row, m]
                 left = share * (pull_out_nm(drives, m, w[row, m] * sqrt(at)) - held)
                 use[p] = moving / left if abs(moving) < MOST * left else (MOST if moving > 0.0 else -MOST)
                 nearest[i, p] = max(nearest[i, p], abs(use[p]))
             torque_use[i, m] = largest_between(use)
+
+
+@kernel
+def between(start: float, end: float, share: float) -> float:
+    """Return the squared rate at a share of an interval: it is linear in s, and never negative by rounding."""
+    return max(0.0, start + (end - start) * share)
 
 
 @kernel

@@ -21,6 +21,7 @@ from planarm.trajectory.limits import Limits
 REST_SHARE = 1e-12
 """Where the motion rests, the chord of sqrt(x) ends at this share of the largest x instead of at 0."""
 
+SLOW_SHARE = 0.05
 MOST_HALVINGS = 60
 BISECTIONS = 50
 NEAR = 1e-9
@@ -35,7 +36,7 @@ class Grid:
         s: gridpoints, shape (m,).
         speed_share, acceleration_share, torque_share: shape (m - 1, n).
         tangent_x: squared path speed at which the torque's tangents touch, shape (m,); zero for the flat torque alone.
-        growth: how many times `tangent_x` the squared path speed may be.
+        growth: how many times `tangent_x`, or a share of its peak, the squared path speed may be.
     """
 
     s: Floats
@@ -118,7 +119,9 @@ def squared_limits(ends: Ends, grid: Grid, limits: Limits, rest: Floats) -> Floa
     rate[rest] = 0.0
     if np.isinf(grid.growth):
         return np.asarray(rate**2)
-    return np.asarray(np.minimum(rate**2, grid.growth * grid.tangent_x))
+    # Where the solution before is slow, friction hardly depends on speed: there x may grow to a share of its peak.
+    known = np.maximum(grid.tangent_x, SLOW_SHARE * grid.tangent_x.max())
+    return np.asarray(np.minimum(rate**2, grid.growth * known))
 
 
 def half_planes(ends: Ends, grid: Grid, limits: Limits, x_limits: Floats) -> tuple[Floats, Floats]:
