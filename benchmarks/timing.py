@@ -1,96 +1,176 @@
-"""How long a recording of many edges takes to judge, and how much memory: `./dev bench timing [--edges N]`.
+"""How fast motions are timed, and how fast they are: ours, toppra, and a stop at every point: `./dev bench timing`.
 
-Two joints with a plan; the VCD is written first, in planarm's own form. Peak memory is the process's own, the plan's
-steps (9 bytes each) and their making included, so each size runs in a process of its own. "Warm": the file is in
-the system's cache and the kernels are compiled.
+The two tasks of paper C's case 1 that the planner benchmarks use, with joints of 2 rad/s and 10 rad/s^2, all of the
+acceleration. Times are medians of warm runs in this one process, in CPU time: compare the ratios. "beyond" is the
+largest use of a limit on a grid ten times denser than the finest here; 1 is the limit. toppra gets the path as its
+derivatives, so that all time the very same path. The last table optimises the path itself, for thin links and for those
+of the example, at both shares of the acceleration.
 """
 
-from __future__ import annotations
-
 import argparse
-import multiprocessing
-import resource
-import tempfile
-import time
-from pathlib import Path
-from typing import IO
+from collections.abc import Callable
+from dataclasses import replace
+from math import pi
+from statistics import median
+from time import perf_counter, process_time
 
 import numpy as np
+import toppra
 from rich.console import Console
+from rich.table import Table
 
-from planarm.analysis.capture import open_capture
-from planarm.analysis.channels import map_channels
-from planarm.analysis.step_match import Schedule
-from planarm.analysis.timing import PulseLimits, TimingRules, analyse
+from planarm.experiments.scenes import table1_scene
+from planarm.fastest.search import Budget, find_fastest
+from planarm.fastest.task import scene_task
+from planarm.pipeline import planning_margin_cm
+from planarm.route import smoothed, tip_route
+from planarm.scene import Scene
+from planarm.smoothing.smooth_path import Floats, SmoothPath
+from planarm.trajectory.limits import Limits
+from planarm.trajectory.motion import Trajectory
+from planarm.trajectory.timing import fastest_motion
 
-CODES = ("!", '"')
+PAIRS = (((45.0, 5.0), (-45.0, 5.0)), ((25.0, 42.0), (-25.0, 42.0)))
+GRIDPOINTS = (300, 1000, 3000)
+DENSE = 30_000
+FIRST_ROUNDS = 2
+
+
+class ForToppra(toppra.interpolator.AbstractGeometricPath):
+    """One of our paths, as toppra asks for it."""
+
+    def __init__(self, path: SmoothPath) -> None:
+        self.path = path
+
+    def __call__(self, path_positions: float | Floats, order: int = 0) -> Floats:
+        """Return angles or a derivative."""
+        return self.path.evaluate(np.atleast_1d(path_positions))[order].reshape(*np.shape(path_positions), -1)
+
+    @property
+    def dof(self) -> int:
+        """The number of joints."""
+        return 2
+
+    @property
+    def path_interval(self) -> Floats:
+        """First and last path parameter."""
+        return self.path.borders_s[[0, -1]]
+
+    @property
+    def waypoints(self) -> tuple[Floats, Floats]:
+        """The borders."""
+        return self.path.borders_s, self.path.evaluate(self.path.borders_s).q_rad
+
+
+def by_toppra(path: SmoothPath, scene: Scene, gridpoints: int) -> Trajectory:
+    """Return toppra's motion, as a trajectory of constant path acceleration between its gridpoints."""
+    speeds = np.array([joint.max_speed_rad_s for joint in scene.joints])
+    accelerations = np.array([joint.max_acceleration_rad_s2 for joint in scene.joints])
+    grid = np.linspace(*path.borders_s[[0, -1]], gridpoints)
+    solver = toppra.algorithm.TOPPRA(
+        [
+            toppra.constraint.JointVelocityConstraint(np.stack([-speeds, speeds], axis=1)),
+            toppra.constraint.JointAccelerationConstraint(np.stack([-accelerations, accelerations], axis=1)),
+        ],
+        ForToppra(path),
+        gridpoints=grid,
+        solver_wrapper="seidel",
+    )
+    _, rates, _ = solver.compute_parameterization(0.0, 0.0)
+    t_s = np.concatenate([[0.0], np.cumsum(2.0 * np.diff(grid) / (rates[1:] + rates[:-1]))])
+    return Trajectory(path, t_s, grid, rates, path.evaluate(grid).q_rad)
+
+
+def beyond(motion: Trajectory, limits: Limits) -> float:
+    """Return the largest use of a limit, by speeds and accelerations at dense times."""
+    t_s = np.linspace(0.0, motion.duration_s, DENSE)
+    _, speeds, accelerations = motion.sample(t_s)
+    use = np.abs(speeds) / limits.speeds_rad_s, np.abs(accelerations) / limits.accelerations_rad_s2
+    return float(max(part.max() for part in use))
+
+
+def timed(run: Callable[[], Trajectory], repeats: int) -> tuple[Trajectory, float]:
+    """Return a run's result and the median of its CPU times in ms."""
+    result = run()
+    spent = []
+    for _ in range(repeats):
+        began = process_time()
+        run()
+        spent.append(1e3 * (process_time() - began))
+    return result, median(spent)
+
+
+def compare(console: Console, scene: Scene, repeats: int) -> None:
+    """Time one grid path by all means, and print the table."""
+    limits = Limits.of_joints(scene.joints, 1.0)
+    bare = replace(
+        limits,
+        speeds_rad_s=np.array([j.max_speed_rad_s for j in scene.joints]),
+        accelerations_rad_s2=np.array([j.max_acceleration_rad_s2 for j in scene.joints]),
+    )
+    route = tip_route(scene, planning_margin_cm(scene))
+    blended, path = route.smooth, route.path
+    stopping = smoothed(replace(scene, motion=replace(scene.motion, corners="stop")), route.free_map, path)
+    start, goal = scene.task.start_cm, scene.task.goal_cm
+    table = Table("", "duration s", "ms", "beyond", title=f"{start} -> {goal}, path {path.length_cm:.2f} cm")
+    rows: list[tuple[str, Callable[[], Trajectory]]] = [
+        ("ours, checked and repaired", lambda: fastest_motion(blended, limits)),
+        ("ours, first answer", lambda: fastest_motion(blended, limits, rounds=FIRST_ROUNDS)),
+        *((f"toppra, {n} gridpoints", lambda n=n: by_toppra(blended, scene, n)) for n in GRIDPOINTS),  # type: ignore[misc]
+        ("ours, a stop at every corner", lambda: fastest_motion(stopping, limits)),
+    ]
+    for name, run in rows:
+        motion, ms = timed(run, repeats)
+        table.add_row(name, f"{motion.duration_s:.4f}", f"{ms:.2f}", f"{beyond(motion, bare):.4f}")
+    console.print(table)
+
+
+def optimise(console: Console, budget_s: float) -> None:
+    """Optimise the paths themselves, and print the table."""
+    table = Table(
+        "task", "links cm wide", "share", "duration s", "found after s", title=f"optimised, at most {budget_s:g} s"
+    )
+    everywhere = ((-pi / 2, 1.5 * pi), (-pi, pi))
+    example = table1_scene(1)
+    for start, goal in PAIRS:
+        for width in (0.01, example.arm.link_width_cm):
+            for share in (1.0, 0.8):
+                arm = replace(example.arm, link_width_cm=width, joint_limits_rad=everywhere)
+                scene = replace(example, arm=arm, task=replace(example.task, start_cm=start, goal_cm=goal))
+                limits = Limits.of_joints(scene.joints, share)
+                found: list[tuple[float, float]] = []
+                began = perf_counter()
+
+                def told(
+                    _share: float, best_s: float, found: list[tuple[float, float]] = found, began: float = began
+                ) -> None:
+                    if not found or best_s < found[-1][1] * 0.999:
+                        found.append((perf_counter() - began, best_s))
+
+                task = scene_task(scene, planning_margin_cm(scene), limits)
+                spline = find_fastest(task, [], Budget(budget_s), 1, perf_counter, told)
+                assert spline is not None
+                motion = fastest_motion(spline, limits)
+                table.add_row(
+                    f"{start} -> {goal}", f"{width:g}", f"{share:g}", f"{motion.duration_s:.4f}", f"{found[-1][0]:.2f}"
+                )
+    console.print(table)
 
 
 def main() -> None:
-    """Write, judge, print."""
-    parser = argparse.ArgumentParser(prog="./dev bench timing", description=__doc__)
-    parser.add_argument("--edges", type=float, nargs="+", default=[1e6, 1e7], help="sizes to run (1e6 1e7)")
-    context = multiprocessing.get_context("spawn")
-    Console(width=100).print(
-        f"{'edges':>12} {'file MB':>9} {'judged s':>9} {'M edges/s':>10} {'peak MB':>8} {'steps':>12}  verdict"
-    )
-    for edges in parser.parse_args().edges:
-        with tempfile.TemporaryDirectory() as folder:
-            process = context.Process(target=run, args=(int(edges), Path(folder) / "wave.vcd"))
-            process.start()
-            process.join()
-
-
-def run(edges: int, path: Path) -> None:
-    """Judge one file and print its row."""
-    steps = edges // 4
-    schedules = write(path, steps)
-    rules = TimingRules((PulseLimits(1.9e-6, 1.9e-6, 650e-9, 650e-9),) * 2)
-    small = path.with_name("small.vcd")
-    warm_up = write(small, 1000)
-    capture = open_capture(path)
-    channels = map_channels(path, capture.channels, [])
-    analyse(open_capture(small), channels, warm_up, rules)  # the kernels
-    began = time.perf_counter()
-    report = analyse(capture, channels, schedules, rules)
-    took = time.perf_counter() - began
-    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
-    size = path.stat().st_size / 1e6
-    counted = sum(joint.steps for joint in report.joints)
-    Console(width=100).print(
-        f"{edges:12,} {size:9.1f} {took:9.2f} {edges / took / 1e6:10.2f} {peak:8.0f} {counted:12,}  ok={report.ok}"
-    )
-
-
-def write(path: Path, steps: int) -> list[Schedule]:
-    """Write two joints' pulses in pieces, 20 to 25 us apart; return their schedules."""
-    rng = np.random.default_rng(1)
-    schedules = []
-    for joint in range(2):
-        gaps = rng.integers(320, 400, steps) + joint
-        schedules.append(Schedule(62_500 * np.cumsum(gaps), np.full(steps, -1, np.int8)))
-    with path.open("w", encoding="ascii") as file:
-        file.write("$timescale 100 ps $end\n")
-        for code, name in zip(("!", '"', "#", "$"), ("D9", "D10", "D4", "D5"), strict=True):
-            file.write(f"$var wire 1 {code} {name} $end\n")
-        file.write('$enddefinitions $end\n#0\n$dumpvars\n0!\n0"\n0#\n0$\n$end\n')
-        window = 20_000_000_000  # of time units: 2 s
-        for begin in range(0, max(int(s.times_ps[-1]) for s in schedules) // 100 + 1_000_000, window):
-            _write_window(file, schedules, begin, begin + window)
-    return schedules
-
-
-def _write_window(file: IO[str], schedules: list[Schedule], begin: int, end: int) -> None:
-    """Write the edges of both joints that fall into a stretch of time, in order."""
-    times, words = [], []
-    for code, schedule in zip(CODES, schedules, strict=True):
-        rises = schedule.times_ps // 100
-        for level, moments in (("1", rises), ("0", rises + 31_250)):
-            inside = moments[np.searchsorted(moments, begin) : np.searchsorted(moments, end)]
-            times.append(inside)
-            words += [level + code] * len(inside)
-    moments = np.concatenate(times)
-    file.write("".join(f"#{moments[i]}\n{words[i]}\n" for i in np.argsort(moments, kind="stable").tolist()))
+    """Parse and run."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--repeats", type=int, default=21, help="warm runs of each")
+    parser.add_argument("--budget", type=float, default=5.0, help="seconds of optimising for each row; 0 leaves it out")
+    options = parser.parse_args()
+    console = Console()
+    toppra.setup_logging("ERROR")
+    example = table1_scene(1)
+    for start, goal in PAIRS:
+        compare(console, replace(example, task=replace(example.task, start_cm=start, goal_cm=goal)), options.repeats)
+    if options.budget > 0.0:
+        optimise(console, 1.0)  # compiles
+        optimise(console, options.budget)
 
 
 if __name__ == "__main__":

@@ -11,7 +11,7 @@ from motion_paths import JointCurve, joint, joint_line, tip_path, tip_points, wa
 from planarm.errors import TimingError
 from planarm.trajectory.check import limit_use
 from planarm.trajectory.limits import Limits
-from planarm.trajectory.timing import time_path
+from planarm.trajectory.timing import fastest_motion, time_path
 
 
 def least_time_s(way, speed, acceleration):
@@ -174,3 +174,14 @@ def test_borders_must_ascend(borders):
     path.borders_s = np.array(borders)
     with pytest.raises(TimingError, match="borders"):
         time_path(path, [joint(), joint()])
+
+
+@pytest.mark.parametrize("rounds", [0, 1, 2, 3])
+def test_a_first_answer_keeps_the_limits_and_comes_near(rounds):
+    limits = Limits.of_joints([joint(), joint()], 1.0)
+    path = tip_path(tip_points(np.random.default_rng(8), 6))
+    first, best = fastest_motion(path, limits, rounds=rounds), fastest_motion(path, limits)
+    assert limit_use(first, limits).largest <= 1.0 + 1e-9
+    assert first.duration_s >= best.duration_s * (1.0 - 1e-3)
+    if rounds >= 2:
+        assert first.duration_s <= 1.1 * best.duration_s
