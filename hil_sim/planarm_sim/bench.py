@@ -16,7 +16,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
+from functools import partial
+from typing import Any, Literal, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,7 +31,35 @@ __all__ = ["Bench", "BenchReport"]
 
 SLICE_CYCLES = 16_000
 """How far the board runs ahead of the arm, 1 ms; with limit switches a tenth of that."""
+BOUNCE_CYCLES = 3200
+"""Between two bounces of a contact that was just pressed or let go of, 0.2 ms."""
+CHATTER_CYCLES = 16_000
+"""Between two changes of a switch that bounces on its own, 1 ms."""
+
+SwitchState = Literal["stuck_open", "stuck_closed", "bouncing"]
+
 EMPTY = np.empty(0, [("cycle", np.int64), ("pin", np.uint8), ("level", np.uint8)])
+
+
+class SerialLine(Protocol):
+    """The host's end of the serial line: `Uno.serial`, or one on which things go wrong."""
+
+    @property
+    def pending(self) -> int:
+        """Bytes written that have not passed yet."""
+
+    @property
+    def idle_cycle(self) -> int:
+        """Cycle at which the last byte written has passed."""
+
+    def write(self, data: bytes) -> None:
+        """Send bytes to the board."""
+
+    def read(self) -> bytes:
+        """Take everything received so far."""
+
+    def peek(self) -> bytes:
+        """Everything received so far, left in place."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,7 +104,10 @@ class Bench:
         uno: the board.
         plant: the arm.
         drivers: the drivers.
+        serial: the host's end of the serial line; faults put another in its place.
     """
+
+    serial: SerialLine
 
     def __init__(self, uno: Uno, rig: Rig, drivers: Sequence[DriverWiring], *, step_cycles: int | None = None) -> None:
         if len(drivers) != len(rig.motors):
@@ -83,6 +115,7 @@ class Bench:
                 f"the rig has {len(rig.motors)} motors, {len(drivers)} drivers are given; give one for each"
             )
         self.uno = uno
+        self.serial = uno.serial
         self.plant = Plant(rig, uno.cycle, step_cycles=step_cycles)
         levels = [0] * (1 + max(pin.index for pin in PINS))
         for pin in PINS:
@@ -92,9 +125,15 @@ class Bench:
         self._fresh: list[NDArray[Any]] = []
         self._seen_cycle = uno.cycle
         self._agenda: list[tuple[int, int, Callable[[], None]]] = []
+        self._agenda_count = 0
+        self._await_step: list[Callable[[int], None]] = []
+        self._forced: dict[int, SwitchState] = {}
+        self._switches_seen = 0
         states = self.drivers.states
         self.plant.take(np.array([[uno.cycle, m, phase, on] for m, (phase, on) in enumerate(states.tolist())]))
         uno.listen(self._hear)
+        for k in range(len(rig.switches)):
+            self._drive_switch(k, self.plant.pressed[k])
 
     @property
     def cycle(self) -> int:
@@ -134,23 +173,47 @@ class Bench:
 
     def at(self, cycle: int, action: Callable[[], None]) -> None:
         """Do something to the bench when its time comes; actions of one cycle happen in the order of these calls."""
-        self._agenda.append((cycle, len(self._agenda), action))
+        self._agenda_count += 1
+        self._agenda.append((cycle, self._agenda_count, action))
         self._agenda.sort(key=lambda entry: entry[:2])
+
+    def on_first_step(self, action: Callable[[int], None]) -> None:
+        """Do something when the first step pulse is seen; it is given the pulse's cycle, a slice ago at most."""
+        self._await_step.append(action)
 
     def catch_up(self) -> None:
         """Let drivers and arm see everything up to the board's time."""
         now = self.uno.cycle
         edges = np.concatenate([EMPTY, *self._fresh]) if self._fresh else EMPTY
         self._fresh = []
-        self.plant.take(self.drivers.see(edges, now))
+        before = self.drivers.counted_phases
+        events = self.drivers.see(edges, now)
+        self.plant.take(events)
         self.plant.run_to(now)
         self._seen_cycle = now
+        if self._await_step and (self.drivers.counted_phases != before).any():
+            waiting, self._await_step = self._await_step, []
+            for action in waiting:
+                action(int(events[0, 0]))
+        self._follow_switches()
 
     def set_motor_supply(self, on: bool) -> None:
         """Switch the supply of all motors; the board on USB goes on."""
         self.catch_up()
         for m in range(len(self.drivers.wirings)):
             self.plant.take(self.drivers.set_power(m, on, self.uno.cycle))
+
+    def force_switch(self, switch: int, state: SwitchState | None) -> None:
+        """Let a limit switch stick or bounce from now on; None: it works again."""
+        if state is None:
+            self._forced.pop(switch, None)
+            self._drive_switch(switch, self.plant.pressed[switch])
+            return
+        self._forced[switch] = state
+        if state == "bouncing":
+            self._chatter(switch, True)
+        else:
+            self._drive_switch(switch, state == "stuck_closed")
 
     def report(self) -> BenchReport:
         """What happened so far."""
@@ -173,6 +236,33 @@ class Bench:
 
     def _hear(self, edges: NDArray[Any]) -> None:
         self._fresh.append(edges)
+
+    def _follow_switches(self) -> None:
+        """Carry the switches' changes to the board; the contact chatters for a while after each."""
+        changes = self.plant.switch_changes() if self.plant.rig.switches else ()
+        for change in changes[self._switches_seen :]:
+            if change.switch in self._forced:
+                continue
+            bounces = int(self.plant.rig.switches[change.switch].bounce_s * CLOCK_HZ / BOUNCE_CYCLES)
+            self._drive_switch(change.switch, change.pressed)
+            for n in range(1, 2 * (bounces // 2) + 1):
+                level = change.pressed if n % 2 == 0 else not change.pressed
+                self.at(self.uno.cycle + n * BOUNCE_CYCLES, partial(self._drive_unless_forced, change.switch, level))
+        self._switches_seen = len(changes)
+
+    def _chatter(self, switch: int, closed: bool) -> None:
+        """Open and close a bouncing switch until it works again."""
+        if self._forced.get(switch) == "bouncing":
+            self._drive_switch(switch, closed)
+            self.at(self.uno.cycle + CHATTER_CYCLES, partial(self._chatter, switch, not closed))
+
+    def _drive_unless_forced(self, switch: int, closed: bool) -> None:
+        if switch not in self._forced:
+            self._drive_switch(switch, closed)
+
+    def _drive_switch(self, switch: int, closed: bool) -> None:
+        pin = self.uno.pin(self.plant.rig.switches[switch].pin)
+        pin.drive(0 if closed else 1)
 
     def _do_what_is_due(self) -> None:
         while self._agenda and self._agenda[0][0] <= self.uno.cycle:

@@ -9,6 +9,7 @@
     ├── RunError         the program cannot go on; carries the cycle
     │   ├── StoppedError bad opcode, BREAK, asleep for ever; carries the cause
     │   └── LimitError   what `run_until` waited for did not come
+    ├── FaultError       a schedule of faults that is none, or names what the bench does not have
     ├── TraceError       a waveform file that cannot be written or read
     ├── DefectError      the chip's state contradicts itself: a defect of the emulator, or files of two versions mixed
     └── BridgeError      no pseudo-terminal, or its link cannot be made
@@ -19,6 +20,7 @@ from __future__ import annotations
 __all__ = [
     "BridgeError",
     "DefectError",
+    "FaultError",
     "ImageError",
     "LimitError",
     "PinError",
@@ -76,6 +78,10 @@ class StoppedError(RunError):
 
 class LimitError(RunError):
     """What `Uno.run_until` waited for did not come within its limit."""
+
+
+class FaultError(SimError):
+    """A schedule of faults that cannot be read, or that names what the bench does not have."""
 
 
 class TraceError(SimError):

@@ -12,6 +12,7 @@
     ├── TimingError       4  the path cannot be timed within the joints' limits
     ├── CertificateError  4  a check of the finished plan failed
     ├── LinkError         5  the serial line or its protocol failed; link.position.StreamError tells where the arm is
+    ├── HostKilledError   5  a schedule of faults killed the host
     ├── DeviceFault       6  the firmware latched a fault or refused a command; so does link.position.StreamFault
     └── StepsDifferError  7  the executed steps are not the planned ones
 
@@ -94,6 +95,12 @@ class CertificateError(PlanarmError):
 
 class LinkError(PlanarmError):
     """The serial line or its protocol failed."""
+
+    exit_code: ClassVar[int] = 5
+
+
+class HostKilledError(PlanarmError):
+    """A schedule of faults killed the host: its program ends here, the board and the arm go on."""
 
     exit_code: ClassVar[int] = 5
 

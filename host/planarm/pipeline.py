@@ -6,8 +6,8 @@ scene -> FreeMap -> Path -> SmoothPath -> Trajectory -> StepTrain -> SegmentPlan
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
-from contextlib import closing
+from collections.abc import Callable, Iterator
+from contextlib import closing, contextmanager
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -17,7 +17,14 @@ from numpy.typing import NDArray
 
 from planarm.analysis.step_count import Waveform, compare_steps, measure_steps
 from planarm.arm_findings import SETTLE_S, ArmFindings, judge_arm, start_tick_of
-from planarm.errors import CertificateError, StepsDifferError, TimingError
+from planarm.errors import (
+    CertificateError,
+    DeviceFault,
+    HostKilledError,
+    LinkError,
+    StepsDifferError,
+    TimingError,
+)
 from planarm.fastest.task import fastest_path
 from planarm.link.arm_record import ArmSetup, ArmTrace
 from planarm.link.exchange import StreamResult, stream_plan
@@ -47,6 +54,9 @@ Notice = Callable[[str, float], None]
 
 CURVE_POINTS = 400
 """Positions by which the curve of a motion is told in reports."""
+
+SETTLE_AFTER_FAILURE_S = 1.0
+"""Emulated time after a stream that failed: what the board has queued is executed, and the arm comes to rest."""
 
 LONGEST_MOTION_S = 600.0
 """The certificate looks at a motion every 0.1 ms; beyond ten minutes that takes gigabytes."""
@@ -140,7 +150,15 @@ def stored(plan: Plan) -> StoredPlan:
     )
 
 
-def run_scene(scene: Scene, port: str, out: Path, notice: Notice) -> dict[str, Any]:
+def run_scene(
+    scene: Scene,
+    port: str,
+    out: Path,
+    notice: Notice,
+    *,
+    faults: Path | None = None,
+    fault_seed: int | None = None,
+) -> dict[str, Any]:
     """Plan, stream, verify and report; return the summary.
 
     Args:
@@ -148,15 +166,19 @@ def run_scene(scene: Scene, port: str, out: Path, notice: Notice) -> dict[str, A
         port: where the firmware is: sim://, a device or pty path, or a pyserial URL.
         out: folder for plan, trace, summary and pictures.
         notice: told the progress.
+        faults: a schedule of what goes wrong around an emulated board (docs/faults.md).
+        fault_seed: in place of the schedule's own.
 
     Raises:
         PlanarmError: the branch of the tree tells which stage failed. Differing steps are reported first, then raised.
+            When the stream failed, its notes tell what the emulated arm did.
     """
     plan = plan_scene(scene, notice)
     begin_run_folder(out, stored(plan))
-    setup = ArmSetup(scene, plan.segments.start_usteps)
+    setup = ArmSetup(scene, plan.segments.start_usteps, faults, fault_seed)
     with closing(open_transport(port, scene.link.baud, setup)) as transport:
-        streamed = stream(plan.segments, plan.certificate, transport, notice)
+        with telling_of_the_arm(plan, transport):
+            streamed = stream(plan.segments, plan.certificate, transport, notice)
         findings = judge_pins(plan.segments, transport.pins) if transport.pins else None
         arm = judge_emulated_arm(plan, findings, transport.arm) if findings and transport.arm else None
     summary = summarise(plan, streamed, findings, arm)
@@ -190,6 +212,20 @@ def judge_pins(plan: SegmentPlan, trace: PinTrace) -> Findings:
     )
     planned = [(joint.ticks, joint.directions) for joint in expand(plan).steps]
     return Findings(measured, compare_steps(planned, measured))
+
+
+@contextmanager
+def telling_of_the_arm(plan: Plan, transport: Transport) -> Iterator[None]:
+    """Add to an error of the stream what became of the emulated arm."""
+    try:
+        yield
+    except (LinkError, DeviceFault, HostKilledError) as error:
+        if transport.arm and transport.pins:
+            transport.arm.settle(SETTLE_AFTER_FAILURE_S)
+            arm = judge_emulated_arm(plan, judge_pins(plan.segments, transport.pins), transport.arm)
+            for line in (*arm.record.faults, f"the emulated arm: {arm.explain()}"):
+                error.add_note(line)
+        raise
 
 
 def judge_emulated_arm(plan: Plan, findings: Findings, trace: ArmTrace) -> ArmFindings:

@@ -5,7 +5,7 @@ import tomllib
 from pathlib import Path
 
 import planarm
-from planarm.scene import load, parse_scene
+from planarm.scene import limit_switches, load, parse_scene
 
 ROOT = Path(__file__).resolve().parents[2]
 TEXT = (ROOT / "docs" / "scene.md").read_text(encoding="utf-8")
@@ -23,6 +23,7 @@ TABLES = {
     "transmission": load.TRANSMISSION_KEYS,
     "motion": load.MOTION_KEYS,
     "joint_space": load.JOINT_SPACE_KEYS,
+    "limit_switches": limit_switches.KEYS,
 }
 
 

@@ -261,12 +261,13 @@ class Uno:
                 )
             self._run_to(min(self._chip.cycle + step, end))
 
-    def reset(self) -> None:
+    def reset(self, cause: ResetCause = ResetCause.EXTERNAL) -> None:
         """Press the reset button: an external reset, now. SRAM and the bytes on the serial line stay.
 
-        It is what a host does to a real Uno by DTR when it opens the port; a boot loader starts.
+        It is what a host does to a real Uno by DTR when it opens the port; a boot loader starts. MCUSR tells the
+        program of another `cause`.
         """
-        self._chip.reset(ResetCause.EXTERNAL)
+        self._chip.reset(cause)
         self._collect()
 
     def pin(self, name: str) -> Pin:

@@ -29,6 +29,9 @@ SAMPLE_CYCLES = 8000
 """Time between samples of the motion, 0.5 ms."""
 CHUNK_STEPS = 4000
 MOST_MARKS = 4096
+REST_RAD_S = 1e-7
+REST_A = 1e-9
+"""Where all moves slower and no current changes more, nothing will move before something is asked for."""
 NO_EVENTS = np.empty((0, 4), np.int64)
 PHASE_PER_STEP = 256
 
@@ -114,6 +117,7 @@ class Plant:
         self._marks: list[Floats] = []
         self._log = [np.concatenate([[cycle], self._state.y])[None]]
         self._waiting = NO_EVENTS
+        self._at_rest = False
 
     @property
     def cycle(self) -> int:
@@ -173,22 +177,27 @@ class Plant:
         y = self._state.y
         y[:n], y[n : 2 * n] = np.cumsum(q_rad), np.cumsum(q_dot_rad_s)
         y[2 * n : 2 * n + m] = self._rotors_at(np.asarray(q_rad))
+        self._at_rest = False
         y[2 * n + m :] = (self._drive.coupling @ np.asarray(q_dot_rad_s)) / self._drive.gear
 
     def set_friction(self, joint: int, coulomb_nm: float) -> None:
         """Change a joint's dry friction from now on."""
+        self._at_rest = False
         self._state.coulomb[joint] = coulomb_nm
 
     def set_rotor_friction(self, motor: int, coulomb_nm: float) -> None:
         """Change a rotor's dry friction from now on; far beyond its torque it is jammed."""
+        self._at_rest = False
         self._state.rotor_coulomb[motor] = coulomb_nm
 
     def set_outside_torque(self, joint: int, torque_nm: float) -> None:
         """Push on a joint from outside, from now on."""
+        self._at_rest = False
         self._state.outside[joint] = torque_nm
 
     def set_supply(self, motor: int, volts: float) -> None:
         """Change what a driver can put on its motor's phases, from now on."""
+        self._at_rest = False
         self._state.supply[motor] = volts
 
     def take(self, events: Ints) -> None:
@@ -205,14 +214,40 @@ class Plant:
         """
         steps = (cycle - self._cycle) // self._step_cycles
         while steps > 0:
-            chunk = min(steps, CHUNK_STEPS)
-            self._run(chunk)
+            chunk = self._skip_rest(steps)
+            if chunk == 0:
+                chunk = min(steps, CHUNK_STEPS)
+                before = self._state.y.copy(), self._state.currents.copy()
+                self._run(chunk)
+                self._at_rest = self._rests_since(*before)
             steps -= chunk
         if not np.isfinite(self._state.y).all():
             raise UsageError(
                 f"the arm's motion is no number any more before {self._cycle / CYCLES_PER_S:.6f} s; give the plant a "
                 f"step_cycles below {self._step_cycles}"
             )
+
+    def _skip_rest(self, steps: int) -> int:
+        """Let time pass without computing while nothing moves and nothing is asked for; returns the steps skipped."""
+        if not self._at_rest:
+            return 0
+        if len(self._waiting):
+            steps = min(steps, int(self._waiting[0, 0] - self._cycle) // self._step_cycles - 1)
+        if steps <= 0:
+            return 0
+        self._cycle += steps * self._step_cycles
+        if self._sample_cycles:
+            self._log.append(np.concatenate([[self._cycle], self._state.y])[None])
+        return steps
+
+    def _rests_since(self, y: Floats, currents: Floats) -> bool:
+        n, m = len(self.rig.links), len(self.rig.motors)
+        speeds = np.concatenate([self._state.y[n : 2 * n], self._state.y[2 * n + m :]])
+        return bool(
+            np.abs(speeds).max() < REST_RAD_S
+            and np.abs(self._state.y - y).max() < REST_RAD_S
+            and np.abs(self._state.currents - currents).max(initial=0.0) < REST_A
+        )
 
     def _run(self, steps: int) -> None:
         every = self._sample_cycles or (1 << 60)
@@ -298,6 +333,7 @@ class Plant:
 
     def restore(self, snapshot: tuple[Any, ...]) -> None:
         """Go back to a snapshot."""
+        self._at_rest = False
         self._cycle, arrays, log, marks, self._waiting = snapshot
         for array, saved in zip((*self._state, self._switches.pressed), arrays, strict=True):
             array[...] = saved

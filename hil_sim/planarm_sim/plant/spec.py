@@ -72,7 +72,7 @@ class Motor:
         supply_v: motor supply.
         rotor_inertia_kg_m2: of the rotor.
         detent_torque_nm: without current.
-        damping_nm_s: eddy currents and bearings, for 1 rad/s of the rotor (the value of MathWorks' stepper block).
+        damping_nm_s: eddy currents and bearings, for 1 rad/s of the rotor; makers do not state it.
         coulomb_nm: dry friction of the rotor.
         gear_ratio: turns of the motor for one behind the gear.
         reversed: the motor's positive sense turns the gear's output the negative way.
@@ -90,7 +90,7 @@ class Motor:
     supply_v: float = 24.0
     rotor_inertia_kg_m2: float = 5.4e-6
     detent_torque_nm: float = 0.022
-    damping_nm_s: float = 1e-3
+    damping_nm_s: float = 3e-4
     coulomb_nm: float = 0.0
     gear_ratio: float = 1.0
     reversed: bool = False
@@ -143,7 +143,7 @@ class LimitSwitch:
 
     Attributes:
         joint: number from 0.
-        pin: on the board; pulled low while pressed, let go of otherwise (wired to ground, with the pin's pull-up).
+        pin: on the board; low while pressed, else a resistor holds it high.
         at_rad: joint angle from which on it is pressed.
         above: pressed at and beyond `at_rad` when True, at and below it when False.
         bounce_s: how long the contact chatters after each change.

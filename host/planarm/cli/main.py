@@ -104,9 +104,12 @@ def report_error(error: PlanarmError, as_json: bool) -> None:
     """Print the error where its reader looks: one JSON object on stdout, or a sentence on stderr."""
     if as_json:
         told = {"kind": type(error).__name__, "message": str(error), "exit_code": error.exit_code}
-        print(json.dumps({"error": {**error.fields, **told}}))
+        notes = {"notes": list(error.__notes__)} if hasattr(error, "__notes__") else {}
+        print(json.dumps({"error": {**error.fields, **told, **notes}}))
     else:
         print(f"planarm: {error}", file=sys.stderr)
+        for note in getattr(error, "__notes__", ()):
+            print(f"  {note}", file=sys.stderr)
         if error.advice:
             print("What would help:", *(f"  - {sentence}" for sentence in error.advice), sep="\n", file=sys.stderr)
 
@@ -129,6 +132,8 @@ def _add_run(commands: Commands) -> None:
     _add_scene(command)
     _add_port(command)
     command.add_argument("--out", metavar="DIR", help="folder for plan, trace, summary and pictures")
+    command.add_argument("--faults", metavar="FILE", help="a schedule of what goes wrong around the emulated board")
+    command.add_argument("--fault-seed", type=int, metavar="N", help="in place of the schedule's own seed")
     _add_json(command)
 
 

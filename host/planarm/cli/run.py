@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import argparse
 import json
+import shlex
 from pathlib import Path
 
 from planarm.cli.progress import progress
 from planarm.cli.scenes import chosen_scene, tell_first_compile
 from planarm.cli.terminal import terminal
+from planarm.errors import PlanarmError
 
 
 def execute(options: argparse.Namespace) -> int:
@@ -23,12 +25,29 @@ def execute(options: argparse.Namespace) -> int:
         notice("kernels", 0.0)
         warm_up()
         notice("kernels", 1.0)
-        summary = run_scene(scene, scene.link.port if options.port is None else options.port, out, notice)
+        port = scene.link.port if options.port is None else options.port
+        faults = Path(options.faults) if options.faults else None
+        try:
+            summary = run_scene(scene, port, out, notice, faults=faults, fault_seed=options.fault_seed)
+        except PlanarmError as error:
+            if faults is not None:
+                error.add_note(f"replay: {replay_line(options)}")
+            raise
     if options.json:
         print(json.dumps(summary))
     else:
         _print(summary, out)
     return 0
+
+
+def replay_line(options: argparse.Namespace) -> str:
+    """Return the command that does the same run again: emulated time and seeded faults leave nothing to chance."""
+    words = ["planarm", "run", options.scene, "--faults", options.faults]
+    for name in ("planner", "neighbours", "seed", "port", "fault_seed"):
+        value = getattr(options, name, None)
+        if value is not None:
+            words += [f"--{name.replace('_', '-')}", str(value)]
+    return shlex.join(words)
 
 
 def _print(summary: dict[str, object], out: Path) -> None:

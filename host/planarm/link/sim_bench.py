@@ -15,16 +15,18 @@ from planarm_wire.messages import DIR_PINS, ENABLE_PIN, STEP_PINS
 
 if TYPE_CHECKING:
     from planarm_sim import Bench, CircleObstacle, DriverWiring, Motor, PolygonObstacle, Rig, Uno
+    from planarm_sim.faults import FaultRunner
 
 CM = 0.01
 GRAVITY_M_S2 = 9.80665
 
 
 class SimArm:
-    """The arm behind an emulated board."""
+    """The arm behind an emulated board, and what goes wrong with it."""
 
-    def __init__(self, bench: Bench) -> None:
+    def __init__(self, bench: Bench, faults: FaultRunner | None) -> None:
         self._bench = bench
+        self._faults = faults
 
     def record(self) -> ArmRecord:
         """Return what it did so far."""
@@ -41,30 +43,44 @@ class SimArm:
                 for v in report.violations
             ),
             touches=tuple(sorted(touches, key=lambda touch: touch.ticks)),
+            faults=self._fault_lines(),
         )
 
     def settle(self, seconds: float) -> None:
         """Let emulated time pass, so that the arm comes to rest."""
         self._bench.run(seconds=seconds)
 
+    def _fault_lines(self) -> tuple[str, ...]:
+        if self._faults is None:
+            return ()
+        counts = ", ".join(f"{count} bytes {what}" for what, count in self._faults.line.counts.items() if count)
+        return (*self._faults.log, *((counts,) if counts else ()))
 
-def build_bench(uno: Uno, setup: ArmSetup) -> Bench:
-    """Put the scene's drivers, motors and arm around an emulated board.
+
+def build_bench(uno: Uno, setup: ArmSetup) -> tuple[Bench, FaultRunner | None]:
+    """Put the scene's drivers, motors and arm around an emulated board, and let its faults loose.
 
     Raises:
-        EmulatorError: a driver has no such micro-steps.
+        EmulatorError: a driver has no such micro-steps, or the schedule of faults is none.
     """
     from planarm_sim import Bench, SimError  # noqa: PLC0415 - brings Numba, which only emulation needs
+    from planarm_sim.faults import inject, load_schedule  # noqa: PLC0415
 
     try:
-        return Bench(uno, rig_of(setup.scene, setup.start_usteps), drivers_of(setup.scene))
+        bench = Bench(uno, rig_of(setup.scene, setup.start_usteps), drivers_of(setup.scene))
     except SimError as error:
         raise EmulatorError(f"{setup.scene.source}: joints.driver, joints.microsteps: {error}") from error
+    if setup.faults is None:
+        return bench, None
+    try:
+        return bench, inject(bench, load_schedule(setup.faults, setup.fault_seed))
+    except SimError as error:
+        raise EmulatorError(str(error)) from error
 
 
 def rig_of(scene: Scene, start_usteps: tuple[int, ...]) -> Rig:
     """Return the scene's arm, standing where its motors are at `start_usteps`."""
-    from planarm_sim import Joint, Link, Rig  # noqa: PLC0415
+    from planarm_sim import Joint, LimitSwitch, Link, Rig  # noqa: PLC0415
 
     mechanics = scene.mechanics
     lengths_m = [CM * length for length in scene.arm.link_lengths_cm]
@@ -80,8 +96,10 @@ def rig_of(scene: Scene, start_usteps: tuple[int, ...]) -> Rig:
         )
     )
     joints = tuple(
-        Joint(coulomb, viscous)
-        for coulomb, viscous in zip(mechanics.coulomb_friction_nm, mechanics.viscous_friction_nm_s, strict=True)
+        Joint(coulomb, viscous, stops)
+        for coulomb, viscous, stops in zip(
+            mechanics.coulomb_friction_nm, mechanics.viscous_friction_nm_s, mechanics.hard_stops_rad, strict=True
+        )
     )
     return Rig(
         links=links,
@@ -93,6 +111,7 @@ def rig_of(scene: Scene, start_usteps: tuple[int, ...]) -> Rig:
         gravity_m_s2=GRAVITY_M_S2 if mechanics.gravity else 0.0,
         base_m=(CM * scene.arm.base_cm[0], CM * scene.arm.base_cm[1]),
         obstacles=tuple(_obstacle(obstacle) for obstacle in scene.obstacles),
+        switches=tuple(LimitSwitch(s.joint - 1, s.pin, s.at_rad, s.above, s.bounce_s) for s in scene.limit_switches),
     )
 
 

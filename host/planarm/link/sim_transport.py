@@ -9,7 +9,7 @@ import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
-from planarm.errors import LinkError
+from planarm.errors import HostKilledError, LinkError
 from planarm.link.arm_record import ArmSetup
 from planarm.link.clock import Clock
 from planarm.link.sim_bench import SimArm, build_bench
@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from planarm_sim import Bench, Uno
+    from planarm_sim.faults import FaultRunner
 
 SLICE_CYCLES = 1600  # a reply is noticed at most 100 us, or 2.5 bytes at 250,000 baud, after it came
 
@@ -60,10 +61,11 @@ class SimTransport:
         except (SimError, OSError) as error:
             raise LinkError(f"port sim://: {error}") from error
         self._machine: Uno | Bench = self.uno
+        self._faults: FaultRunner | None = None
         self.arm: SimArm | None = None
         if setup is not None:
-            self._machine = build_bench(self.uno, setup)
-            self.arm = SimArm(self._machine)
+            self._machine, self._faults = build_bench(self.uno, setup)
+            self.arm = SimArm(self._machine, self._faults)
         self.clock: Clock = EmulatorClock(self._machine)
         self.pins = EmulatorPins(self.uno)
         self._received = bytearray()
@@ -72,11 +74,12 @@ class SimTransport:
     def read(self, max_bytes: int, deadline_s: float) -> bytes:
         """Run the board until it has sent a byte or its time is `deadline_s`; return at most `max_bytes` bytes."""
         self._check_open("read")
-        uno = self.uno
-        self._received += uno.serial.read()
+        uno, line = self.uno, self._machine.serial
+        self._received += line.read()
         while not self._received and uno.cycle / TICKS_HZ < deadline_s:
             _run(self._machine, min(uno.cycle + SLICE_CYCLES, _cycle_after(deadline_s)))
-            self._received += uno.serial.read()
+            self._meet_faults("read")
+            self._received += line.read()
         data = bytes(self._received[:max_bytes])
         del self._received[:max_bytes]
         return data
@@ -84,11 +87,24 @@ class SimTransport:
     def write(self, data: bytes) -> None:
         """Put `data` on the line; it reaches the chip byte by byte as time passes."""
         self._check_open("write")
-        self.uno.serial.write(data)
+        self._meet_faults("write")
+        self._machine.serial.write(data)
 
     def close(self) -> None:
         """Stop using the board; its pins stay readable."""
         self._open = False
+
+    def _meet_faults(self, action: str) -> None:
+        """Do what a schedule of faults does to the host itself: its cable, its processor, its life."""
+        faults = self._faults
+        if faults is None:
+            return
+        if pause := faults.host_pause_cycles():
+            _run(self._machine, self.uno.cycle + pause)
+        if faults.host_killed:
+            raise HostKilledError(f"port sim://: {faults.schedule.source} killed the host at {self.uno.time_s:.6f} s")
+        if faults.unplugged:
+            raise LinkError(f"port sim://: {action} at {self.uno.time_s:.6f} s: the cable is out")
 
     def _check_open(self, action: str) -> None:
         if not self._open:

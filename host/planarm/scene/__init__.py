@@ -5,6 +5,7 @@ centimetres and radians. docs/scene.md is the reference of the format.
 """
 
 from planarm.scene.joint_space import ElbowChoice, JointObjective, JointSpaceSpec
+from planarm.scene.limit_switches import LimitSwitchSpec
 from planarm.scene.load import load_scene, parse_scene, with_planner, with_space
 from planarm.scene.mechanics import Matrix, MechanicsSpec
 from planarm.scene.motor import MotorSpec
@@ -38,6 +39,7 @@ __all__ = [
     "JointObjective",
     "JointSpaceSpec",
     "JointSpec",
+    "LimitSwitchSpec",
     "LinkSpec",
     "Matrix",
     "MechanicsSpec",

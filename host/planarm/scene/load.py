@@ -7,6 +7,7 @@ from pathlib import Path
 
 from planarm.errors import SceneError
 from planarm.scene.joint_space import JOINT_SPACE_KEYS, JointSpaceSpec, read_joint_space
+from planarm.scene.limit_switches import parse_limit_switches
 from planarm.scene.mechanics import MECHANICS_KEYS, TRANSMISSION_KEYS, parse_coupling, parse_mechanics
 from planarm.scene.motion import MOTION_KEYS, read_motion
 from planarm.scene.motor import KEYS as MOTOR_KEYS
@@ -44,6 +45,7 @@ ROOT_KEYS = (
     "transmission",
     "motion",
     "joint_space",
+    "limit_switches",
 )
 ARM_KEYS = ("link_lengths_cm", "link_width_cm", "base_cm", "elbow", "joint_limits_deg", "floor")
 WORKSPACE_KEYS = ("x_cm", "y_cm", "cell_cm", "clearance_cm")
@@ -133,6 +135,7 @@ def parse_scene(text: str, source: str) -> Scene:
         if "joint_space" in data
         else None,
         motion=read_motion(root.table("motion", MOTION_KEYS, optional=True)),
+        limit_switches=parse_limit_switches(root, LINKS),
     )
 
 

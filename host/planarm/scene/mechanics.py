@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import inf, radians
 
 import numpy as np
 
@@ -18,6 +19,7 @@ MECHANICS_KEYS = (
     "viscous_friction_nm_s",
     "backlash_deg",
     "stiffness_nm_rad",
+    "hard_stops_deg",
 )
 TRANSMISSION_KEYS = ("coupling",)
 
@@ -45,6 +47,7 @@ class MechanicsSpec:
         viscous_friction_nm_s: of each joint, for 1 rad/s.
         backlash_rad: whole play of each motor's gear, seen at the joint.
         stiffness_nm_rad: of each motor's gear or belt, seen at the joint.
+        hard_stops_rad: least and greatest angle that each joint can mechanically take; infinite where it turns freely.
     """
 
     gravity: bool
@@ -56,6 +59,7 @@ class MechanicsSpec:
     viscous_friction_nm_s: tuple[float, ...]
     backlash_rad: tuple[float, ...]
     stiffness_nm_rad: tuple[float, ...]
+    hard_stops_rad: tuple[tuple[float, float], ...]
 
     @classmethod
     def usual(cls, link_lengths_cm: tuple[float, ...]) -> MechanicsSpec:
@@ -83,7 +87,18 @@ def parse_mechanics(table: Table, link_lengths_cm: tuple[float, ...]) -> Mechani
         viscous_friction_nm_s=_each(table, "viscous_friction_nm_s", [VISCOUS_NM_S] * links),
         backlash_rad=tuple(np.radians(_each(table, "backlash_deg", [0.0] * links, at_most=45.0)).tolist()),
         stiffness_nm_rad=_each(table, "stiffness_nm_rad", [STIFFNESS_NM_RAD] * links, above=0.0, at_most=1e7),
+        hard_stops_rad=_hard_stops_rad(table, links),
     )
+
+
+def _hard_stops_rad(table: Table, links: int) -> tuple[tuple[float, float], ...]:
+    key = "hard_stops_deg"
+    if key not in table.data:
+        return ((-inf, inf),) * links
+    stops = table.ranges(key, (), within=720.0)
+    if len(stops) != links:
+        table.reject(key, [list(stop) for stop in stops], f"one [least, greatest] for each of the {links} joints")
+    return tuple((radians(least), radians(greatest)) for least, greatest in stops)
 
 
 def parse_coupling(table: Table, joints: int) -> Matrix:

@@ -28,6 +28,7 @@ UNITS = {
     "v": "volts",
     "ohm": "ohms",
     "mh": "millihenries",
+    "ms": "milliseconds",
 }
 """The unit suffixes that keys of a scene end in."""
 

@@ -5,6 +5,7 @@ from math import ceil, floor, pi
 from typing import Literal
 
 from planarm.scene.joint_space import JointSpaceSpec
+from planarm.scene.limit_switches import LimitSwitchSpec
 from planarm.scene.mechanics import Matrix, MechanicsSpec
 from planarm.scene.motor import MotorSpec
 
@@ -159,6 +160,7 @@ class Scene:
     motion: MotionSpec = MotionSpec()
     joint_space: JointSpaceSpec | None = None
     """How to plan in joint space; None plans in tip space."""
+    limit_switches: tuple[LimitSwitchSpec, ...] = ()
 
     @property
     def margin_cm(self) -> float:
