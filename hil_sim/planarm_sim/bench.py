@@ -14,9 +14,11 @@ board, limit switches, happens as the next slice begins. Two runs with the same 
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from functools import partial
+from pathlib import Path
 from typing import Any, Literal, Protocol
 
 import numpy as np
@@ -228,6 +230,18 @@ class Bench:
             contacts=self.plant.contacts(),
             stop_hits=self.plant.stop_hits(),
         )
+
+    def write_report(self, path: Path) -> None:
+        """Write `report` as a JSON file."""
+        path.write_text(json.dumps(asdict(self.report()), indent=1) + "\n", encoding="utf-8")
+
+    def write_motion(self, path: Path) -> None:
+        """Write `motion` as a CSV file: seconds, joint angles in radians, rotor angles in radians."""
+        motion = self.motion()
+        columns = np.column_stack([motion["cycle"] / CLOCK_HZ, motion["q_rad"], motion["rotor_rad"]])
+        names = [f"q{j + 1}_rad" for j in range(motion["q_rad"].shape[1])]
+        names += [f"rotor{m + 1}_rad" for m in range(motion["rotor_rad"].shape[1])]
+        np.savetxt(path, columns, "%.9g", ",", header=",".join(["t_s", *names]), comments="")
 
     def motion(self) -> NDArray[Any]:
         """Samples of the motion so far, see `Plant.motion`."""

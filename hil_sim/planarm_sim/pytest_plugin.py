@@ -20,13 +20,19 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 if TYPE_CHECKING:
+    from planarm_sim.bench import Bench
     from planarm_sim.board import Uno
 
-__all__ = ["Artefacts", "artefacts_of", "make_uno", "uno"]
+__all__ = ["Artefacts", "artefacts_of", "bench", "make_uno", "uno"]
 
 MARKER = (
     "uno(firmware=FILE, **settings): the program of the fixture `uno`, Intel HEX or ELF, relative to the test's file "
     "or to the root directory; settings as Uno.from_file takes them (baud=, bootloader=, ...)"
+)
+
+BENCH_MARKER = (
+    "bench(drivers=[{driver, step, direction, ...}], rig=RIG, faults=FILE): what stands around the board of `bench`; "
+    "each driver as planarm_sim.drivers.wiring_of takes it, the rig a planarm_sim.Rig"
 )
 
 
@@ -74,6 +80,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 def pytest_configure(config: pytest.Config) -> None:
     """Tell pytest of the marker."""
     config.addinivalue_line("markers", MARKER)
+    config.addinivalue_line("markers", BENCH_MARKER)
 
 
 @pytest.fixture
@@ -98,6 +105,38 @@ def make_uno(request: pytest.FixtureRequest) -> Callable[..., Uno]:
 def uno(make_uno: Callable[..., Uno]) -> Uno:
     """An emulated Uno at power-up, with the program of the marker `uno`, of --uno-firmware, or of `uno_firmware`."""
     return make_uno()
+
+
+@pytest.fixture
+def bench(uno: Uno, request: pytest.FixtureRequest) -> Bench:
+    """The board of the fixture `uno` with drivers, motors and an arm around it, as the marker `bench` says.
+
+    Let time pass by the bench: `bench.run(seconds=1)`. When the test fails, what the arm did is kept as bench.json and
+    motion.csv.
+    """
+    from planarm_sim.bench import Bench  # noqa: PLC0415 - see the module's text
+    from planarm_sim.drivers import wiring_of  # noqa: PLC0415
+    from planarm_sim.faults import inject, load_schedule  # noqa: PLC0415
+    from planarm_sim.plant import desk_arm  # noqa: PLC0415
+
+    marker = request.node.get_closest_marker("bench")
+    settings = dict(marker.kwargs) if marker is not None else {}
+    drivers = [wiring_of(**entry) for entry in settings.pop("drivers", ())]
+    if not drivers:
+        raise pytest.UsageError(
+            f"{request.node.nodeid} asks for a bench, and nothing says which drivers are on it: mark the test with "
+            '@pytest.mark.bench(drivers=[{"driver": "a4988", "step": "D2", "direction": "D5"}])'
+        )
+    rig, faults = settings.pop("rig", None), settings.pop("faults", None)
+    if settings:
+        raise pytest.UsageError(f"{request.node.nodeid}: the marker bench does not know {', '.join(settings)}")
+    made = Bench(uno, rig or desk_arm(len(drivers)), drivers)
+    if faults is not None:
+        inject(made, load_schedule(_found(faults, request)))
+    artefacts = artefacts_of(request.node)
+    artefacts.add("bench.json", made.write_report)
+    artefacts.add("motion.csv", made.write_motion)
+    return made
 
 
 def _program_of(request: pytest.FixtureRequest) -> tuple[str, dict[str, Any]]:

@@ -15,7 +15,7 @@ from planarm_sim.drivers import judge
 from planarm_sim.errors import UsageError
 from planarm_wire.drivers import DRIVERS, RULES, DriverRow
 
-__all__ = ["DriverBank", "DriverCounts", "DriverWiring", "Violation", "driver_row"]
+__all__ = ["DriverBank", "DriverCounts", "DriverWiring", "Violation", "driver_row", "wiring_of"]
 
 CYCLES_PER_S = 16_000_000
 _NO_EDGES = np.zeros((0, 3), np.int64)
@@ -235,6 +235,15 @@ def driver_row(name: str) -> DriverRow:
         return DRIVERS[name]
     close = difflib.get_close_matches(name, DRIVERS, n=1, cutoff=0.0)[0]
     raise UsageError(f"no driver {name!r}; known: {', '.join(DRIVERS)}. Closest: {close}")
+
+
+def wiring_of(driver: str, **settings: Any) -> DriverWiring:  # noqa: ANN401 - they are DriverWiring's
+    """Return a driver on its pins, by the driver's name and `DriverWiring`'s settings.
+
+    Raises:
+        UsageError: no such driver, or it has no such micro-steps.
+    """
+    return DriverWiring(driver_row(driver), **settings)
 
 
 def in_order(events: NDArray[np.int64]) -> NDArray[np.int64]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from planarm_sim.plant.plant import Contact, Plant, Slip, StopHit, SwitchChange
-from planarm_sim.plant.spec import CircleObstacle, Joint, LimitSwitch, Link, Motor, PolygonObstacle, Rig
+from planarm_sim.plant.spec import CircleObstacle, Joint, LimitSwitch, Link, Motor, PolygonObstacle, Rig, desk_arm
 
 __all__ = [
     "CircleObstacle",
@@ -18,4 +18,5 @@ __all__ = [
     "Slip",
     "StopHit",
     "SwitchChange",
+    "desk_arm",
 ]

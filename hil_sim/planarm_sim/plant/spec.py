@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from planarm_sim.errors import UsageError
 
-__all__ = ["CircleObstacle", "Joint", "LimitSwitch", "Link", "Motor", "PolygonObstacle", "Rig"]
+__all__ = ["CircleObstacle", "Joint", "LimitSwitch", "Link", "Motor", "PolygonObstacle", "Rig", "desk_arm"]
 
 Point = tuple[float, float]
 
@@ -203,3 +203,10 @@ class Rig:
     def zeros(self) -> NDArray[np.float64]:
         """`zero_rad` as an array, zeros when not given."""
         return np.array(self.zero_rad or (0.0,) * len(self.links))
+
+
+def desk_arm(motors: int) -> Rig:
+    """Return a light arm that lies on a desk, one link a motor, each motor straight on its joint."""
+    link = Link.rod(0.1, 0.03)
+    joint = Joint(coulomb_nm=0.005, viscous_nm_s=0.002)
+    return Rig((link,) * motors, (joint,) * motors, (Motor(),) * motors, (0.0,) * motors)
