@@ -13,10 +13,10 @@ from planarm.stepping.certificate import Check, Verdict, at_least, at_most
 from planarm.stepping.check_motion import Planned
 from planarm.stepping.plan import SegmentPlan
 from planarm.stepping.slowing import LINK_MARGIN_TICKS
-from planarm.stepping.table import SegmentTable
+from planarm.stepping.table import SegmentTable, segment_bytes
 from planarm.stepping.train import Floats, Ticks
 from planarm_wire.kernel_cache import kernel
-from planarm_wire.messages import QUEUE_SLOTS, TICKS_HZ
+from planarm_wire.messages import QUEUE_BYTES, TICKS_HZ
 
 ROUNDING = 0.02
 """Differences see accelerations a tenth of a millisecond wide, and the planner's at a point."""
@@ -71,9 +71,21 @@ def _check_fit(table: SegmentTable, needs_s: Floats) -> Check:
     return Check(name, least, 0.0, "s", verdict, f"segment {k}, {_time(starts[k])}", setting)
 
 
+HEAD_BYTES = 2
+"""What the queue keeps of a frame besides its segments, 4 bytes, shared by two."""
+
+
 def _queue_ends(table: SegmentTable) -> list[int]:
     """Return for each segment the first one that a full queue does not hold when it starts."""
-    return [min(k + QUEUE_SLOTS, len(table.durations)) for k in range(len(table.durations))]
+    sizes = [int(size) + HEAD_BYTES for size in segment_bytes(table)]
+    ends, end, held = [], 0, 0
+    for size in sizes:
+        while end < len(sizes) and held + sizes[end] <= QUEUE_BYTES:
+            held += sizes[end]
+            end += 1
+        ends.append(end)
+        held -= size
+    return ends
 
 
 def _largest_changes(planned: Planned, scene: Scene, sign: float) -> Floats:

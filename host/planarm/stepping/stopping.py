@@ -21,7 +21,7 @@ from planarm.stepping.train import Floats, Ticks
 from planarm.stepping.windows import start_stop_ticks
 from planarm.trajectory.motion import Trajectory
 from planarm_wire.kernel_cache import kernel
-from planarm_wire.messages import QUEUE_SLOTS, TICKS_HZ
+from planarm_wire.messages import QUEUE_BYTES, TICKS_HZ
 
 JUST_BEFORE_S = 1e-9
 """Accelerations jump at gridpoints; they are looked at on both sides."""
@@ -115,8 +115,13 @@ def path_time_to_rest(durations_s: Floats, slow_per_s: Floats, over_start_stop: 
     return needs
 
 
+QUEUED_HEAD_BYTES = 2
+"""A segment's share of its frame's head in the device's queue, four bytes, two segments a frame as a rule."""
+
+
 def held_until(starts: Ticks, segment_bytes: Ticks) -> Ticks:
     """Return the end of the path that the device holds when each segment starts and its queue is full, in ticks."""
     last = len(segment_bytes)
-    held = np.minimum(np.arange(last) + QUEUE_SLOTS, last)
+    total = np.concatenate([[0], np.cumsum(segment_bytes + QUEUED_HEAD_BYTES)])
+    held = np.minimum(np.searchsorted(total, total[:-1] + QUEUE_BYTES, side="right") - 1, last)
     return np.asarray(starts[held])
