@@ -3,6 +3,7 @@
 ::
 
     PlanarmError
+    ├── UsageError        2  the words of the command line are wrong
     ├── SceneError        2  the scene file, or a value given in its place, is wrong
     ├── EmulatorError     2  the emulator cannot start: image, link or file
     ├── OutputError       2  a file or folder cannot be written
@@ -33,6 +34,12 @@ class PlanarmError(Exception):
     exit_code: ClassVar[int] = 1
     advice: tuple[str, ...] = ()
     fields: Mapping[str, Any] = MappingProxyType({})
+
+
+class UsageError(PlanarmError):
+    """The words of the command line are wrong, or what they name is not there."""
+
+    exit_code: ClassVar[int] = 2
 
 
 class SceneError(PlanarmError):

@@ -10,8 +10,9 @@ module's compiled code:
 - the versions of Python and Numba, and the NUMBA_ settings of the environment (bounds checks, for one,
   change the code).
 
-So a kernel may call and freeze what its module imports at the left margin; a kernel that is handed another
-as an argument would escape the hash, and the house has none.
+A file that is edited while a process runs is compiled for that process alone and not kept: its modules may have
+been imported before the edit. A kernel may call and freeze what its module imports at the left margin; one that is
+handed another as an argument would escape the hash, and the house has none.
 
 Folder: `PLANARM_CACHE_DIR` when set, else the user's cache folder (`XDG_CACHE_HOME` or `~/.cache`, on
 macOS `~/Library/Caches`, on Windows `%LOCALAPPDATA%`), else, when that cannot be written, a folder of the
@@ -33,6 +34,7 @@ import stat
 import sys
 import tempfile
 import threading
+import time
 from collections.abc import Callable, Iterator
 from importlib import metadata
 from pathlib import Path
@@ -48,6 +50,7 @@ _KEY_NAME = re.compile(r"[0-9a-f]{16}")
 # An import at the left margin: the module, then what it takes from it (one line, or a bracket over several).
 _IMPORT = re.compile(rb"^(?:from[ \t]+([\w.]+)[ \t]+import[ \t]+(\([^)]*\)|[^\n]*)|import[ \t]+([^\n]*))", re.M)
 _NAME = re.compile(rb"[\w.]+")
+_STARTED_NS = time.time_ns()
 _config_lock = threading.Lock()
 
 
@@ -64,7 +67,10 @@ def kernel(function: F) -> F:
         return function
     source = Path(function.__code__.co_filename)
     inside = "" if source.stem != "__init__" else ".__init__"  # a package's own file, see _module_name
-    folder = _prepared_folder(function.__module__ + inside, source)
+    module = function.__module__ + inside
+    if _edited_since_start(module, source):
+        return cast("F", numba.njit(function))
+    folder = _prepared_folder(module, source)
     with _config_lock:
         before = config.CACHE_DIR
         config.CACHE_DIR = str(folder)  # read by njit when it makes the function's cache, that is here
@@ -73,6 +79,11 @@ def kernel(function: F) -> F:
         finally:
             config.CACHE_DIR = before
     return cast("F", compiled)
+
+
+def _edited_since_start(module: str, source: Path) -> bool:
+    """Tell whether a file was written after this process began: what is compiled may then not be what it holds."""
+    return any(path.stat().st_mtime_ns > _STARTED_NS for path in _closure(module, source).values())
 
 
 def is_cold(package: str) -> bool:

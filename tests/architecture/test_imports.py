@@ -133,6 +133,20 @@ ALLOWED: dict[str, set[str]] = {
         "planarm.stepping",
         "planarm_wire",
     },
+    "planarm.campaign": {
+        "planarm",
+        "planarm.errors",
+        "planarm.output",
+        "planarm.scene",
+        "planarm.workspace",
+        "planarm.search",
+        "planarm.stepping",
+        "planarm.link",
+        "planarm.analysis",
+        "planarm.pipeline",
+        "planarm_wire",
+        "planarm_sim",
+    },
     "planarm.timing_flow": {
         "planarm.errors",
         "planarm.scene",
@@ -166,6 +180,7 @@ ALLOWED: dict[str, set[str]] = {
         "planarm.experiments",
         "planarm.pipeline",
         "planarm.timing_flow",
+        "planarm.campaign",
         "planarm.output",
         "planarm.plan_file",
         "planarm.warm_up",
@@ -178,6 +193,7 @@ ALLOWED: dict[str, set[str]] = {
 SIM_DOORS = {
     "host/planarm/link/sim_bench.py",
     "host/planarm/link/sim_transport.py",
+    "host/planarm/campaign/line_faults.py",
     "host/planarm/cli/emulate.py",
 }
 

@@ -4,6 +4,7 @@ import os
 import stat
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import pytest
@@ -16,6 +17,7 @@ WIRE_FOLDER = Path(kernel_cache.__file__).parents[1]
 # kernel came from the disk cache.
 PROGRAM = """
 import sys
+import time
 from planarm_wire.kernel_cache import is_cold
 cold = is_cold("arm_kernels")
 numba_loaded = "numba" in sys.modules
@@ -82,6 +84,13 @@ def test_an_edit_in_a_caller_leaves_its_callee_compiled(package: Path, tmp_path:
     assert run(package, cache) == ["False", "False", "4", "0", "False"]
     builds = {path.name: len(list(path.iterdir())) for path in (cache / "kernels").iterdir()}
     assert builds == {"arm_kernels.caller": 2, "arm_kernels.callee": 1}
+
+
+def test_a_file_edited_while_the_process_runs_is_not_cached(package: Path, tmp_path: Path) -> None:
+    later = time.time() + 3600
+    os.utime(package / "constants.py", (later, later))
+    assert run(package, tmp_path / "cache")[2] == "3"
+    assert not list((tmp_path / "cache").rglob("*.nb*"))
 
 
 def test_kernels_of_a_packages_own_file_follow_its_relative_imports(package: Path, tmp_path: Path) -> None:

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from typing import Any, NoReturn, TypeAlias
 
 import planarm
-from planarm.errors import OutputError, PlanarmError
+from planarm.errors import OutputError, PlanarmError, UsageError
 
 EXIT_CODES = """exit codes:
   0 ok    2 bad input    3 no path    4 cannot be timed or certified
@@ -65,12 +65,6 @@ class Stopped(PlanarmError):  # noqa: N818 - not an error
     exit_code = 130
 
 
-class UsageError(PlanarmError):
-    """The words of the command line are wrong."""
-
-    exit_code = 2
-
-
 class _Parser(argparse.ArgumentParser):
     """A parser that keeps the exit codes' table as it is, and whose errors are told like all others."""
 
@@ -97,6 +91,9 @@ def build_parser() -> argparse.ArgumentParser:
     _add_emulate(commands)
     _add_compare(commands)
     _add_timing(commands)
+    _add_campaign(commands, "sweep", "plan or search many scenes and settings")
+    _add_campaign(commands, "campaign", "run many emulated boards with faults")
+    _add_report(commands)
     return parser
 
 
@@ -199,6 +196,24 @@ def _add_timing(commands: Commands) -> None:
     )
     command.add_argument("--tolerance-us", type=_positive, default=1.0, metavar="US", help="off time beyond (1)")
     command.add_argument("--junit", metavar="FILE.xml", help="also write the verdict as JUnit XML")
+    _add_json(command)
+
+
+def _add_campaign(commands: Commands, name: str, purpose: str) -> None:
+    command = commands.add_parser(name, help=purpose, epilog=EXIT_CODES)
+    command.add_argument("file", metavar=f"{name.upper()}.toml", help="what to run; see docs/scale.md")
+    command.add_argument("--out", metavar="DIR", help="folder of the results (out/NAME)")
+    command.add_argument("--resume", action="store_true", help="run only what is missing there")
+    command.add_argument("--workers", type=_count, metavar="N", help="processes on this machine (one a core)")
+    command.add_argument("--only", type=int, metavar="N", help="repeat run N here and tell its row; nothing is written")
+    command.add_argument("--dask", metavar="tcp://HOST:PORT", help="a Dask scheduler, instead of this machine")
+    _add_json(command)
+
+
+def _add_report(commands: Commands) -> None:
+    command = commands.add_parser("report", help="tables and plots of a sweep's or campaign's results")
+    command.add_argument("results", metavar="DIR", help="the folder of the results")
+    command.add_argument("--out", metavar="DIR", help="folder for the plots")
     _add_json(command)
 
 

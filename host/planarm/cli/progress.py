@@ -5,6 +5,10 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from planarm.campaign.run import Progress
 
 Report = Callable[[str, float], None]
 """Takes the stage's name and the share done, 0 to 1."""
@@ -54,3 +58,29 @@ def _bar() -> Iterator[Report]:
             bar.update(tasks[stage], completed=share)
 
         yield report
+
+
+def counting_bar() -> Callable[[Progress], None]:
+    """Return what shows finished runs of all, with the remaining time, on stderr; it ends with the last run."""
+    from rich.console import Console
+    from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeElapsedColumn
+    from rich.progress import Progress as Bar
+
+    bar = Bar(
+        BarColumn(),
+        MofNCompleteColumn(),
+        TimeElapsedColumn(),
+        TextColumn("{task.fields[left]}"),
+        console=Console(stderr=True),
+    )
+    task = bar.add_task("runs", left="")
+    bar.start()
+
+    def tell(progress: Progress) -> None:
+        left = "" if progress.remaining_s is None else f"about {progress.remaining_s:.0f} s left"
+        done = progress.finished + progress.before
+        bar.update(task, total=progress.size, completed=done, left=left)
+        if done >= progress.size:
+            bar.stop()
+
+    return tell

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from planarm.cli.progress import progress
 from planarm.cli.scenes import tell_first_compile
-from planarm.errors import CaptureError, StepsDifferError
+from planarm.errors import StepsDifferError, UsageError
 from planarm.output import require_place, writing
 
 if TYPE_CHECKING:
@@ -24,9 +24,9 @@ def execute(options: argparse.Namespace) -> int:
     names = [Path(name) for name in options.captures]
     is_diff = options.captures[0] == "diff" and len(names) > 1
     if len(names) != (3 if is_diff else 1):
-        raise CaptureError("give one capture, or 'diff' and two captures; 'planarm timing --help' shows both")
+        raise UsageError("give one capture, or 'diff' and two captures; 'planarm timing --help' shows both")
     if is_diff and options.plan:
-        raise CaptureError("diff holds one capture against the other; --plan goes with one capture")
+        raise UsageError("diff holds one capture against the other; --plan goes with one capture")
     if options.junit:
         require_place(Path(options.junit))
     request = TimingRequest(

@@ -116,6 +116,15 @@ def parse_scene(text: str, source: str) -> Scene:
         data = tomllib.loads(text)
     except (ValueError, RecursionError) as problem:  # TOMLDecodeError; numbers of 4301 digits; a thousand brackets
         raise SceneError(source, "", f"is not valid TOML: {problem}") from problem
+    return scene_from_toml(data, source)
+
+
+def scene_from_toml(data: dict[str, object], source: str) -> Scene:
+    """Read a scene from the tables of a TOML file.
+
+    Raises:
+        SceneError: they are no scene (docs/scene.md).
+    """
     root = Table.with_keys(source, "", data, ROOT_KEYS)
     workspace = _workspace(root.table("workspace", WORKSPACE_KEYS))
     arm = _arm(root.table("arm", ARM_KEYS))

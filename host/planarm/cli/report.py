@@ -1,0 +1,75 @@
+"""`planarm report DIR`: what a sweep's or campaign's results say."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from planarm.errors import UsageError
+from planarm.output import writing
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+    from planarm.report.campaign import Failure, GroupRow
+
+
+def execute(options: argparse.Namespace) -> int:
+    """Print tables of groups and failures; with --out draw the distributions."""
+    from planarm.campaign.store import read_about, read_rows
+    from planarm.report.campaign import failures, figure_names, grouped, report_json
+
+    folder = Path(options.results)
+    told = read_about(folder)
+    table = read_rows(folder)
+    if table is None:
+        raise UsageError(f"{folder}: holds no row yet; 'planarm sweep {told.source} --resume --out {folder}' goes on")
+    rows = table.to_pylist()
+    figures = figure_names(rows)
+    groups = grouped(rows, figures)
+    failed = failures(rows, f"planarm campaign {told.source}")
+    if options.json:
+        print(report_json(groups, failed))
+    else:
+        _print(groups, failed, figures, f"{told.name}: {len(rows):,} of {told.size:,} runs, {told.code}")
+    if options.out:
+        _draw(rows, figures, Path(options.out), options.json)
+    return 0
+
+
+def _print(groups: list[GroupRow], failed: list[Failure], figures: list[str], title: str) -> None:
+    from planarm.cli.terminal import terminal
+
+    console = terminal()
+    console.print(title, markup=False)
+    console.print(_groups_table(groups, figures))
+    for failure in failed:
+        console.print(f"{failure.runs} x {failure.verdict}: {failure.reason}", markup=False, highlight=False)
+        console.print(f"    again: {failure.example}", markup=False, highlight=False)
+
+
+def _groups_table(groups: list[GroupRow], figures: list[str]) -> Table:
+    from rich import box
+    from rich.table import Table
+
+    table = Table(box=box.SIMPLE_HEAD, pad_edge=False, caption="figures: 5 % / median / 95 %", caption_justify="left")
+    settings = list(groups[0].settings) if groups else []
+    verdicts = sorted({verdict for group in groups for verdict in group.verdicts})
+    for name in (*(s.removeprefix("set.") for s in settings), "runs", *verdicts, *figures):
+        table.add_column(name, justify="right")
+    for group in groups:
+        spreads = [" / ".join(f"{v:.5g}" for v in group.figures[f]) if f in group.figures else "" for f in figures]
+        counts = [str(group.verdicts.get(verdict, 0)) for verdict in verdicts]
+        table.add_row(*(str(group.settings[s]) for s in settings), f"{group.runs:,}", *counts, *spreads)
+    return table
+
+
+def _draw(rows: list[dict[str, object]], figures: list[str], out: Path, quiet: bool) -> None:
+    from planarm.report.campaign_plots import draw_distribution
+
+    with writing(out):
+        for figure in figures:
+            draw_distribution(rows, figure, out / f"{figure}.png")
+    if not quiet:
+        print(f"pictures: {out}")
