@@ -9,10 +9,10 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from planarm.cli.main import UsageError
 from planarm.cli.progress import progress
 from planarm.cli.scenes import chosen_scene, tell_first_compile
 from planarm.cli.terminal import terminal
+from planarm.errors import UsageError
 
 if TYPE_CHECKING:
     from rich.table import Table
