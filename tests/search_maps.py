@@ -60,8 +60,11 @@ def planner(algorithm, neighbours, *, moves="nodes", subset="run", seed=1) -> Pl
     return PlannerSpec(algorithm, neighbours, subset, seed, moves)
 
 
-PLANNERS = [(algorithm, count) for algorithm, counts in NEIGHBOURS.items() for count in counts]
-"""Every algorithm with every neighbourhood."""
+GRID = ("a_star", "modified_a_star", "chaos_a_star", "chs")
+"""The algorithms of paper C; their paths are moves of a stencil."""
+
+PLANNERS = [(algorithm, count) for algorithm in GRID for count in NEIGHBOURS[algorithm]]
+"""Every algorithm of paper C with every neighbourhood."""
 
 EXACT = [(algorithm, count) for algorithm, count in PLANNERS if algorithm != "chaos_a_star"]
 """Those that use the whole neighbourhood."""

@@ -38,7 +38,7 @@ def test_the_least_scene_has_the_documented_defaults():
     assert scene.arm.floor is False
     assert (scene.workspace.cell_cm, scene.workspace.clearance_cm) == (1.0, 0.0)
     assert scene.obstacles == ()
-    assert scene.planner == PlannerSpec("chs", 56, "run", 1, "proved")
+    assert scene.planner == PlannerSpec("taut", 56, "run", 1, "proved")
     assert scene.motion == MotionSpec("blend", 0.5, 0.8)
     assert (scene.link.port, scene.link.baud) == ("sim://", 250_000)
     joint = scene.joints[0]

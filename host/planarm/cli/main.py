@@ -20,7 +20,7 @@ EXIT_CODES = """exit codes:
 STOPPED_READING = 141
 """What a shell reports of a program that a closed pipe has ended."""
 
-PLANNERS = ("a_star", "modified_a_star", "chaos_a_star", "chs")
+PLANNERS = ("a_star", "modified_a_star", "chaos_a_star", "chs", "taut", "theta_star", "lazy_theta_star", "any_angle")
 
 
 def main(arguments: Sequence[str] | None = None) -> None:

@@ -77,6 +77,10 @@ NEIGHBOURS: dict[Algorithm, tuple[int, ...]] = {
     "modified_a_star": (24, 48),
     "chaos_a_star": (44, 8, 20, 68),
     "chs": (56, 12, 28, 48, 80),
+    "taut": (56, 12, 28, 48, 80),
+    "theta_star": (8,),
+    "lazy_theta_star": (8,),
+    "any_angle": (56, 12, 28, 48, 80),
 }
 """The neighbourhoods that each algorithm knows (paper C, sections IV to VII); the first is the default."""
 
@@ -259,7 +263,7 @@ def _task(table: Table, workspace: WorkspaceSpec) -> TaskSpec:
 
 
 def _planner(table: Table) -> PlannerSpec:
-    algorithm = table.choice("algorithm", tuple(NEIGHBOURS), "chs")
+    algorithm = table.choice("algorithm", tuple(NEIGHBOURS), "taut")
     known = NEIGHBOURS[algorithm]
     neighbours = table.integer("neighbours", known[0], at_least=1, at_most=1000)
     if neighbours not in known:

@@ -11,7 +11,9 @@ from planarm.scene.motor import MotorSpec
 
 Elbow = Literal["up", "down", "either"]
 Shape = Literal["circle", "square", "diamond", "triangle", "hexagon", "polygon"]
-Algorithm = Literal["a_star", "modified_a_star", "chaos_a_star", "chs"]
+Algorithm = Literal[
+    "a_star", "modified_a_star", "chaos_a_star", "chs", "taut", "theta_star", "lazy_theta_star", "any_angle"
+]
 Subset = Literal["run", "expansion"]
 Moves = Literal["proved", "cells", "nodes"]
 Corners = Literal["blend", "stop"]

@@ -155,6 +155,25 @@ def best_first(
     return Found(nodes, int(queue.counts[EXPANDED]), int(queue.counts[MADE]))
 
 
+def flood(lattice: Lattice, moves: Moves, world: ArmWorld, start: int) -> NDArray[np.float64]:
+    """Return the cost of the shortest way from a node to every node, only nodes checked; inf where there is none."""
+    everywhere = moves._replace(planes=np.zeros_like(moves.planes))
+    memory = borrow(lattice.room.size)
+    memory.state[: lattice.room.size] = lattice.room
+    queue = make_open_list(2 * (int(moves.cost.max()) >> BUCKET_BITS) + 4, memory.entry_node, memory.entry_below)
+    memory.state[start], memory.g[start] = START, 1
+    queue.node[0], queue.below[0], queue.ring[0] = start, NONE, 0
+    queue.counts[MADE], queue.counts[WAITING] = 1, 1
+    rules, all_moves = Rules(NODES, 0, 0), lattice.room[:0]
+    while expand(lattice, everywhere, rules, world, -1, 0, memory.state, memory.g, all_moves, queue) == FULL:
+        memory = with_more_entries(memory)
+        queue = queue._replace(node=memory.entry_node, below=memory.entry_below)
+    reached = memory.state[: lattice.room.size] > WHOLE_ROOM
+    costs = np.where(reached, memory.g[: lattice.room.size].astype(np.float64), np.inf)
+    give_back(memory)
+    return costs
+
+
 @kernel
 def expand(  # noqa: C901, PLR0912, PLR0915 - one flat loop: a call that hands on arrays costs more than expanding a node
     lattice: Lattice,

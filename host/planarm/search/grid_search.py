@@ -25,15 +25,20 @@ from planarm.search.best_first import (
     best_first,
     load_kernels,
 )
+from planarm.search.bound import optimal_path, path_bound_cm
 from planarm.search.draw import draw_subset
-from planarm.search.endpoints import Endpoint, endpoint
+from planarm.search.endpoints import ON_NODE_CM, Endpoint, endpoint
 from planarm.search.lattice import make_lattice, make_moves, node_at, nodes_cm, open_room
 from planarm.search.path import Path
 from planarm.search.result import SearchResult, SearchStatus
 from planarm.search.stencils import DRAWN, Offsets, primitive, stencil
+from planarm.search.taut import pull_taut
+from planarm.search.theta import theta_star
 from planarm.workspace.free_map import FreeMap
 
 LEGAL: Final[dict[Moves, int]] = {"nodes": NODES, "cells": CELLS, "proved": PROOF}
+PULLED: Final = ("taut", "any_angle")
+THETA: Final = ("theta_star", "lazy_theta_star")
 FEW_MOVES: Final = 8
 """With no more moves than this, looking at all of them costs less than finding out where not all have to be."""
 
@@ -52,25 +57,36 @@ def find_path(free_map: FreeMap, start_cm: Point, goal_cm: Point, planner: Plann
     begin_s = perf_counter()
     start = endpoint(free_map, "start", start_cm)
     goal = endpoint(free_map, "goal", goal_cm)
-    found, path = Found(np.empty(0, np.int64), 0, 0), None
-    if start.problem:
-        status, reason = SearchStatus.START_BLOCKED, start.problem
-    elif goal.problem:
-        status, reason = SearchStatus.GOAL_BLOCKED, goal.problem
-    else:
-        lattice = make_lattice(free_map, border=int(np.abs(offsets).max()))
-        found = _search(free_map, lattice, offsets, planner, start, goal)
-        if len(found.nodes):
-            status, reason, path = SearchStatus.FOUND, "", _path(free_map, lattice, found, start, goal)
-        else:
-            status, reason = SearchStatus.NO_PATH, _why_no_path(free_map, offsets, planner, start, goal, found)
-    return SearchResult(status, reason, path, found.expanded, found.generated, perf_counter() - begin_s)
+    for end, status in ((start, SearchStatus.START_BLOCKED), (goal, SearchStatus.GOAL_BLOCKED)):
+        if end.problem:
+            return SearchResult(status, end.problem, None, 0, 0, perf_counter() - begin_s)
+    lattice = make_lattice(free_map, border=int(np.abs(offsets).max()))
+    found = _search(free_map, lattice, offsets, planner, start, goal)
+    if not len(found.nodes):
+        reason = _why_no_path(free_map, offsets, planner, start, goal, found)
+        took_s = perf_counter() - begin_s
+        return SearchResult(SearchStatus.NO_PATH, reason, None, found.expanded, found.generated, took_s)
+    path = _path(free_map, lattice, found, start, goal)
+    if planner.algorithm in PULLED and planner.moves != "nodes":
+        path = _pulled(free_map, lattice, path, planner)
+    if planner.algorithm == "any_angle" and planner.moves != "nodes":
+        path = optimal_path(free_map, path, start, goal, planner) or path
+    took_s = perf_counter() - begin_s
+    bound_cm = path_bound_cm(free_map, path, start, goal, planner)
+    return SearchResult(SearchStatus.FOUND, "", path, found.expanded, found.generated, took_s, bound_cm)
 
 
 def _search(
     free_map: FreeMap, lattice: Lattice, offsets: Offsets, planner: PlannerSpec, start: Endpoint, goal: Endpoint
 ) -> Found:
     """Search from the start's node to the goal's."""
+    start_node, goal_node = (node_at(lattice, end.column, end.row) for end in (start, goal))
+    if planner.algorithm in THETA:
+        rules = Rules(LEGAL["cells" if planner.moves == "nodes" else planner.moves], 0, 0)
+        lazy = planner.algorithm == "lazy_theta_star"
+        return theta_star(
+            lattice, make_moves(offsets, lattice), rules, free_map.world, start_node, goal_node, lazy=lazy
+        )
     whole_stencil, drawn, wide_open = offsets, 0, None
     if planner.algorithm == "chaos_a_star":
         drawn = DRAWN[planner.neighbours]
@@ -82,7 +98,6 @@ def _search(
         if len(offsets) > FEW_MOVES:
             least = WHOLE_ROOM if planner.moves == "proved" else ROOM
             wide_open = open_room(lattice, int(np.abs(offsets).max()), least)
-    start_node, goal_node = (node_at(lattice, end.column, end.row) for end in (start, goal))
     rules = Rules(LEGAL[planner.moves], drawn, planner.seed)
     moves = make_moves(offsets, lattice, whole_stencil)
     return best_first(lattice, moves, rules, free_map.world, start_node, goal_node, wide_open)
@@ -105,6 +120,18 @@ def _path(free_map: FreeMap, lattice: Lattice, found: Found, start: Endpoint, go
     if not goal.on_node:
         points_cm = np.concatenate([points_cm, [goal.point_cm]])
     return Path.through(points_cm, free_map.elbow)
+
+
+def _pulled(free_map: FreeMap, lattice: Lattice, path: Path, planner: PlannerSpec) -> Path:
+    """Return the path pulled taut; its ends stay where they are."""
+    origin = np.array([lattice.column, lattice.row])
+    cells = path.points_cm / lattice.cell_cm - origin
+    nodes = np.rint(cells)
+    cells = np.where(np.abs(cells - nodes) <= ON_NODE_CM / lattice.cell_cm, nodes, cells)
+    taut = (pull_taut(lattice, free_map.world, LEGAL[planner.moves], cells) + origin) * lattice.cell_cm
+    taut[0], taut[-1] = path.points_cm[0], path.points_cm[-1]
+    pulled = Path.through(taut, free_map.elbow)
+    return pulled if pulled.length_cm < path.length_cm else path
 
 
 def _why_no_path(

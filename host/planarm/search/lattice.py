@@ -108,6 +108,18 @@ def _erode(room: NDArray[np.uint8], reach: int, least: int, out: NDArray[np.uint
                 target[ix - reach] = 1
 
 
+def near_room(lattice: Lattice, reach: int) -> Lattice:
+    """Return a lattice whose nodes are open where one at most `reach` rows and columns away has room in this one.
+
+    The border must be wider than `reach` by what moves on the result need.
+    """
+    shut = (lattice.room == SHUT).astype(np.uint8)
+    enclosed = open_room(lattice._replace(room=shut), reach, 1).reshape(-1, lattice.width) != 0
+    edge = np.ones_like(enclosed)
+    edge[reach:-reach, reach:-reach] = False
+    return lattice._replace(room=np.where(enclosed | edge, SHUT, ROOM).astype(np.uint8).reshape(-1))
+
+
 def node_at(lattice: Lattice, column: int, row: int) -> int:
     """Return the node at (column * cell_cm, row * cell_cm)."""
     return (row - lattice.row) * lattice.width + column - lattice.column

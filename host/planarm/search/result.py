@@ -30,4 +30,13 @@ class SearchResult:
     generated: int
     """Entries put on its open list: nodes reached for the first time or by a shorter way."""
     plan_s: float
-    """Wall time of the search in seconds, without compiling or loading its kernels."""
+    """Wall time of the search in seconds, without compiling or loading its kernels, and without the bound."""
+    bound_cm: float = 0.0
+    """No path on this map with the same rule for moves is shorter (docs/planners.md: which paths); 0 for no path."""
+
+    @property
+    def gap(self) -> float:
+        """By what share the path is longer than the bound: no path is better by more."""
+        if self.path is None or self.bound_cm <= 0.0:
+            return 0.0
+        return max(0.0, self.path.length_cm / self.bound_cm - 1.0)

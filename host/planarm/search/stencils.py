@@ -47,6 +47,8 @@ class _Disc:
         return dx * dx + dy * dy <= self.radius_squared
 
 
+_DISCS: Final[dict[int, _Square | _Disc]] = {12: _Disc(4), 28: _Disc(9), 48: _Disc(16), 56: _Disc(17), 80: _Disc(25)}
+
 _SHAPES: Final[dict[Algorithm, dict[int, _Square | _Disc]]] = {
     "a_star": {8: _Square(1)},
     "modified_a_star": {24: _Square(2), 48: _Square(3)},
@@ -55,7 +57,11 @@ _SHAPES: Final[dict[Algorithm, dict[int, _Square | _Disc]]] = {
     "chaos_a_star": {8: _Square(1), 20: _Square(2, 1), 44: _Square(3, 1), 68: _Square(4, 2)},
     # Radii 2, 3, 4 and 5 of paper C, fig. 8 hold 12, 28, 48 and 80 nodes. The 56 that its results give for "radius 5"
     # are the nodes with dx^2 + dy^2 <= 17.
-    "chs": {12: _Disc(4), 28: _Disc(9), 48: _Disc(16), 56: _Disc(17), 80: _Disc(25)},
+    "chs": _DISCS,
+    "taut": _DISCS,
+    "any_angle": _DISCS,
+    "theta_star": {8: _Square(1)},
+    "lazy_theta_star": {8: _Square(1)},
 }
 
 DRAWN: Final[dict[int, int]] = {8: 5, 20: 12, 44: 23, 68: 34}

@@ -179,6 +179,12 @@ def prove_line(world: ArmWorld, x0: float, y0: float, x1: float, y1: float) -> t
         UNPROVED with the share around which the margin is too small for a proof, or joint 1 comes to the end of its
         limits (at the ends of a full turn no single pose is forbidden, only the way across).
     """
+    return prove_line_by(world, x0, y0, x1, y1, SMALLEST_CM)
+
+
+@kernel
+def prove_line_by(world: ArmWorld, x0: float, y0: float, x1: float, y1: float, smallest_cm: float) -> tuple[int, float]:
+    """`prove_line` with discs no smaller than this radius."""
     arm, obstacles = world.arm, world.obstacles
     centers, radii = obstacles.centers_cm, obstacles.radii_cm
     first_vertex, vertices = obstacles.first_vertex, obstacles.vertices_cm
@@ -196,7 +202,7 @@ def prove_line(world: ArmWorld, x0: float, y0: float, x1: float, y1: float) -> t
         verdict = _verdict(arm, centers, radii, first_vertex, vertices, x0 + middle * dx, y0 + middle * dy, rho)
         if verdict == PROVED:
             start, width = next_piece(start, width)
-        elif verdict == BLOCKED or rho <= SMALLEST_CM:
+        elif verdict == BLOCKED or rho <= smallest_cm:
             return verdict, middle
         else:
             width *= 0.5
