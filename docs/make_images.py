@@ -4,6 +4,7 @@ They come from the example scenes and the code alone, so the same sources and th
 """
 
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -14,8 +15,10 @@ from planarm.model.arm import Arm
 from planarm.model.kinematics import forward
 from planarm.pipeline import plan_scene
 from planarm.report.envelope import draw_envelope
-from planarm.report.style import INK, JOINT_COLOURS, TEXT_SIZE, dress, new_figure, save, set_title
-from planarm.scene import load_scene
+from planarm.report.style import INK, JOINT_COLOURS, QUIET, TEXT_SIZE, dress, new_figure, save, set_title
+from planarm.scene import Algorithm, PlannerSpec, load_scene
+from planarm.search.grid_search import find_path
+from planarm.workspace.free_map import build_free_map
 from planarm_sim.plant import Motor
 from planarm_sim.plant.pull_out import pull_out_steps_s
 
@@ -32,6 +35,8 @@ def make_images(folder: Path) -> list[Path]:
     files.append(folder / "envelope.png")
     _draw_envelope(DOCS.parent / "examples" / "table1_case1.toml", files[-1])
     _draw_pull_out(files[2])
+    files.append(folder / "search_growth.png")
+    _draw_growth(files[-1])
     return files
 
 
@@ -74,6 +79,46 @@ def _draw_pull_out(target: Path) -> None:
     axes.set_ylim(0.0)
     axes.legend(frameon=False)
     set_title(axes, "Pull-out of the emulated motor", "dashed: V / (2 L I); 2.8 mH, 1.7 A, 1/16 steps")
+
+
+GROWTH_CELLS_CM = (2.0, 1.0, 0.5, 0.25, 0.125)
+GROWTH_STENCILS: tuple[tuple[Algorithm, int], ...] = (
+    ("a_star", 8),
+    ("modified_a_star", 24),
+    ("modified_a_star", 48),
+    ("chs", 56),
+    ("chs", 80),
+)
+
+
+def _draw_growth(target: Path) -> None:
+    """Draw how the search's work grows with cells and with neighbours, counted, not timed: the same everywhere."""
+    scene = load_scene(DOCS.parent / "examples" / "table1_case1.toml")
+    free, work = [], []
+    for cell_cm in GROWTH_CELLS_CM:
+        free_map = build_free_map(replace(scene, workspace=replace(scene.workspace, cell_cm=cell_cm)))
+        ends = (48.0, 4.0), (2.0, 44.0)  # nodes at every cell size
+        free.append(free_map.free_nodes)
+        work.append([find_path(free_map, *ends, PlannerSpec(*which, "run", 1, "proved")) for which in GROWTH_STENCILS])
+    figure = new_figure(9.0, 3.6)
+    left, right = figure.subplots(1, 2)
+    for k, (algorithm, neighbours) in enumerate(GROWTH_STENCILS[::2]):
+        results = [row[2 * k] for row in work]
+        left.loglog(
+            free, [r.expanded for r in results], "o-", color=JOINT_COLOURS[k], label=f"{algorithm} {neighbours}"
+        )
+    left.loglog(free, free, "--", color=QUIET, label="all free nodes")
+    left.set_xlabel("free nodes of the map")
+    left.set_ylabel("nodes expanded")
+    counts = [neighbours for _, neighbours in GROWTH_STENCILS]
+    for place, name, marker in ((0, "expanded", "o-"), (1, "put on the open list", "s-")):
+        values = [(r.expanded, r.generated)[place] for r in work[-1]]
+        right.plot(counts, values, marker, color=JOINT_COLOURS[place], label=name)
+    right.set_xlabel(f"neighbours, cells of {GROWTH_CELLS_CM[-1]:g} cm")
+    right.set_ylim(bottom=0.0)
+    for axes in (left, right):
+        dress(axes)
+        axes.legend(frameon=False, fontsize=8)
     save(figure, target)
 
 

@@ -199,3 +199,17 @@ def test_blocks_judged_at_once_agree_with_single_poses(seed):
     above = forward(Arm.from_spec(scene.arm), q[inside])[:, 1:, 1].min(axis=1) if floor else np.inf
     no_limit = joint1[inside] & (above > scene.margin_cm)
     assert np.array_equal((free_map.region == OBSTACLE)[inside], (no_limit & ~expected[inside]))
+
+
+def test_a_thousand_obstacles_are_judged_like_one_by_one():
+    """Small circles outside and inside reach: blocks forget most of them, and no node notices."""
+    rng = np.random.default_rng(5)
+    angle, distance = rng.uniform(0.0, 2.0 * pi, 1000), rng.uniform(36.0, 75.0, 1000)
+    centers = np.column_stack([distance * np.cos(angle), distance * np.sin(angle)])
+    scene = make_scene([Obstacle("circle", (float(x), float(y)), 0.3) for x, y in centers], width=0.2)
+    free_map, world = build_free_map(scene), build_world(scene)
+    q = poses(scene, free_map)
+    reached = ~np.isnan(q[..., 0])
+    clearance = clearances_cm(world, q[reached])
+    assert np.array_equal((free_map.region == FREE)[reached], clearance > scene.margin_cm)
+    assert 0.05 < np.mean(clearance <= scene.margin_cm) < 0.6
