@@ -169,7 +169,6 @@ def main() -> None:
     for start, goal in PAIRS:
         compare(console, replace(example, task=replace(example.task, start_cm=start, goal_cm=goal)), options.repeats)
     if options.budget > 0.0:
-        optimise(console, 1.0)  # compiles
         optimise(console, options.budget)
 
 

@@ -197,6 +197,14 @@ def test_the_same_seed_and_evaluations_give_the_same_spline_and_progress_rises()
     assert all(a[0] <= b[0] and a[1] >= b[1] for a, b in pairwise(half))
 
 
+def test_a_budget_that_is_used_up_at_once_finds_nothing():
+    task = scene_task(CASE_1, CASE_1.margin_cm, Limits.of_joints(CASE_1.joints))
+    now_s = iter([100.0])  # the budget begins at the first reading, after which a long time has passed
+    told = []
+    assert find_fastest(task, [], Budget(1.0), 1, lambda: next(now_s, 1e6), lambda *now: told.append(now)) is None
+    assert told == []
+
+
 def test_either_elbow_may_pass_through_full_stretch():
     scene = make_scene(elbow="either", start=(35.0, 20.0), goal=(35.0, -20.0))
     task = scene_task(scene, scene.margin_cm, Limits.of_joints(scene.joints))
