@@ -10,10 +10,14 @@ from pathlib import Path
 import numpy as np
 
 from planarm.envelope.maps import envelope_maps
-from planarm.experiments.pictures import draw_paper_stencils, draw_path
+from planarm.experiments.pictures import draw_angles, draw_free_space, draw_paper_stencils, draw_path
+from planarm.experiments.published import CHS
+from planarm.experiments.table2 import load_case
 from planarm.model.arm import Arm
 from planarm.model.kinematics import forward
+from planarm.model.shapes import shape_of
 from planarm.pipeline import plan_scene
+from planarm.report import draw_workspace
 from planarm.report.envelope import draw_envelope
 from planarm.report.style import INK, JOINT_COLOURS, QUIET, TEXT_SIZE, dress, new_figure, save, set_title
 from planarm.scene import Algorithm, PlannerSpec, load_scene
@@ -23,19 +27,23 @@ from planarm_sim.plant import Motor
 from planarm_sim.plant.pull_out import pull_out_steps_s
 
 DOCS = Path(__file__).resolve().parent
+EXAMPLES = DOCS.parent / "examples"
 CURVE_POINTS = 600
 LOAD_SHARES = (0.2, 0.35, 0.5, 0.6, 0.7, 0.8, 0.85)
+POSES_SHOWN = 9
 
 
 def make_images(folder: Path) -> list[Path]:
     """Write all pictures into the folder and return their files."""
-    files = [folder / "stencils.png", folder / "table1_case1.png", folder / "pull_out.png"]
+    names = ("stencils", "table1_case1", "case1_free_space", "case1_chs_joints", "case2_chs", "elbow_change")
+    files = [folder / f"{name}.png" for name in names]
     draw_paper_stencils(files[0])
-    _draw_plan(DOCS.parent / "examples" / "table1_case1.toml", files[1])
-    files.append(folder / "envelope.png")
-    _draw_envelope(DOCS.parent / "examples" / "table1_case1.toml", files[-1])
-    _draw_pull_out(files[2])
-    files.append(folder / "search_growth.png")
+    _draw_plan(EXAMPLES / "table1_case1.toml", files[1])
+    _draw_cases(*files[2:5])
+    _draw_joint_plan(EXAMPLES / "elbow_change.toml", files[5])
+    files += [folder / "pull_out.png", folder / "envelope.png", folder / "search_growth.png"]
+    _draw_pull_out(files[-3])
+    _draw_envelope(EXAMPLES / "table1_case1.toml", files[-2])
     _draw_growth(files[-1])
     return files
 
@@ -120,6 +128,37 @@ def _draw_growth(target: Path) -> None:
         dress(axes)
         axes.legend(frameon=False, fontsize=8)
     save(figure, target)
+
+
+def _draw_cases(free_space: Path, joints: Path, hopping: Path) -> None:
+    """Draw case 1's free space and joint angles, and the path of case 2 that hops over blocked cells."""
+    case1, case2 = load_case(1), load_case(2)
+    draw_free_space(free_space, case1.scene, case1.free_map)
+    path = case1.search(CHS, "proved").path
+    draw_angles(joints, case1.scene, case1.free_map, path, subtitle=f"CHS, 56 neighbours, {path.length_cm:.4f} cm")
+    path = case2.search(CHS, "nodes").path
+    words = f"CHS, 56 neighbours, {path.length_cm:.4f} cm; only nodes checked, as the paper reads"
+    draw_path(hopping, case2.scene, case2.free_map, path, subtitle=words)
+
+
+def _draw_joint_plan(scene_file: Path, target: Path) -> None:
+    """Draw a plan made in joint space, with its way-points and the arm on its way."""
+    plan = plan_scene(load_scene(scene_file), lambda _stage, _share: None)
+    arm, joint = Arm.from_spec(plan.scene.arm), plan.joint
+    q_rad = plan.trajectory.sample(np.linspace(0.0, plan.trajectory.duration_s, CURVE_POINTS))[0]
+    shown = np.linspace(0, CURVE_POINTS - 1, POSES_SHOWN).round().astype(int)
+    draw_workspace(
+        target,
+        x_cm=plan.free_map.x_cm,
+        y_cm=plan.free_map.y_cm,
+        region=plan.free_map.region,
+        obstacles=[shape_of(obstacle) for obstacle in plan.scene.obstacles],
+        path_points_cm=forward(arm, joint.poses_rad)[:, -1],
+        poses_cm=forward(arm, q_rad[shown]),
+        title=plan.scene.name,
+        subtitle=f"joint space: the elbow changes its side at full stretch; {plan.trajectory.duration_s:.2f} s",
+        tip_curve_cm=forward(arm, q_rad)[:, -1],
+    )
 
 
 if __name__ == "__main__":

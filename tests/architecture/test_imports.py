@@ -166,6 +166,7 @@ ALLOWED: dict[str, set[str]] = {
         "planarm.smoothing",
         "planarm.trajectory",
         "planarm.report",
+        "planarm_wire.kernel_cache",
     },
     "planarm.cli": {
         "planarm",

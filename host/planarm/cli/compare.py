@@ -1,4 +1,4 @@
-"""`planarm compare table2`: a paper's table, computed anew, beside the published one."""
+"""`planarm compare table2`: a paper's table, computed anew; `--external CMD`: a planner on the open benchmark."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 from planarm.cli.progress import progress
 from planarm.cli.scenes import tell_first_compile
 from planarm.cli.terminal import terminal
+from planarm.errors import UsageError
 from planarm.output import writing
 
 if TYPE_CHECKING:
@@ -22,8 +23,25 @@ if TYPE_CHECKING:
 
 def execute(options: argparse.Namespace) -> int:
     """Compute the comparison, print it, and write it down where --out says."""
+    if (options.table is None) == (options.external is None):
+        raise UsageError("give table2, or --external CMD")
     tell_first_compile("planarm")
+    if options.external is not None:
+        return _external(options)
     return _as_printed(options) if options.as_printed else _table2(options)
+
+
+def _external(options: argparse.Namespace) -> int:
+    """Score anybody's planner on the open benchmark."""
+    from planarm.experiments.external import score_external, score_table
+
+    with progress(options.json) as notice:
+        score = score_external(options.external, options.scenes, options.timeout_s, notice)
+    if options.json:
+        print(json.dumps(score.fields()))
+    else:
+        terminal().print(_shown(score_table(score)))
+    return 0
 
 
 def _as_printed(options: argparse.Namespace) -> int:
@@ -91,7 +109,7 @@ def _shown(one: TextTable) -> Table:
         words = column < one.words
         shown.add_column(name, justify="left" if words else "right", no_wrap=words)
     for before, cells in zip((one.rows[0], *one.rows), one.rows, strict=False):
-        if before[0] != cells[0]:
+        if one.words > 1 and before[0] != cells[0]:
             shown.add_section()
         shown.add_row(*cells)
     return shown

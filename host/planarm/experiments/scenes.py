@@ -19,9 +19,17 @@ def table1_scene(case: int) -> Scene:
     Raises:
         SceneError: it is not where it should be, or is no scene.
     """
-    name = f"table1_case{case}.toml"
+    return load_scene(example_file(f"table1_case{case}.toml"))
+
+
+def example_file(name: str) -> Path:
+    """Return where a shipped example lies.
+
+    Raises:
+        SceneError: it is not where it should be.
+    """
     for folder in _FOLDERS:
         if (folder / name).is_file():
-            return load_scene(folder / name)
+            return folder / name
     looked = " or ".join(str(folder) for folder in _FOLDERS)
     raise SceneError(name, "", f"is not in {looked}; install planarm again")
