@@ -6,6 +6,7 @@ import argparse
 import sys
 from collections.abc import Sequence
 
+from planarm_sim.bench import BenchReport
 from planarm_sim.emulate import Emulation, Watch, emulate
 from planarm_sim.errors import SimError
 from planarm_sim.insight import Insight
@@ -82,7 +83,22 @@ def summary(result: Emulation) -> str:
         f"rising edges: {edges}; serial: opened {result.counts.opened} x, {result.counts.from_host_bytes} bytes in, "
         f"{result.counts.to_host_bytes} out, {result.counts.lost_bytes} lost"
     )
+    if result.bench is not None:
+        told += f"\n{bench_summary(result.bench)}"
     return told if result.insight is None else f"{told}\n{insight_summary(result.insight)}"
+
+
+def bench_summary(report: BenchReport) -> str:
+    """What the arm did, in a line."""
+    if report.clean:
+        steps = " / ".join(f"{count.made:+.0f}" for count in report.counts)
+        return f"arm: {steps} micro-steps, none lost, no rule broken, nothing touched"
+    lost = " / ".join(map(str, report.lost_full_steps))
+    rules = ", ".join(sorted({violation.rule for violation in report.violations})) or "none"
+    return (
+        f"arm: full steps lost {lost} in {len(report.slips)} slips; rules broken: {rules} "
+        f"({len(report.violations)} times); touches: {len(report.contacts)}; stops hit: {len(report.stop_hits)}"
+    )
 
 
 def insight_summary(insight: Insight) -> str:

@@ -46,6 +46,17 @@ EMPTY = np.empty(0, [("cycle", np.int64), ("pin", np.uint8), ("level", np.uint8)
 class SerialLine(Protocol):
     """The host's end of the serial line: `Uno.serial`, or one on which things go wrong."""
 
+    baud: int
+    host_takes: bool
+
+    @property
+    def bridge(self) -> object | None:
+        """The board's USB bridge; None when the line is direct."""
+
+    @property
+    def room(self) -> int:
+        """Bytes that can be written now without being held back."""
+
     @property
     def pending(self) -> int:
         """Bytes written that have not passed yet."""
@@ -172,6 +183,10 @@ class Bench:
                 self.uno.run(cycles=target - self.uno.cycle)
             if self.uno.cycle >= self._seen_cycle + self._slice_cycles:
                 self.catch_up()
+
+    def reset(self) -> None:
+        """Press the board's reset button; drivers, motors and arm go on."""
+        self.uno.reset()
 
     def at(self, cycle: int, action: Callable[[], None]) -> None:
         """Do something to the bench when its time comes; actions of one cycle happen in the order of these calls."""

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from types import FrameType
 
+from planarm_sim.bench import Bench, BenchReport
 from planarm_sim.board import CLOCK_HZ, Uno, Usb
 from planarm_sim.bridge import BOOT_S, Bridge, BridgeCounts, Clock, Line, Speed, WallClock
 from planarm_sim.cpu.chip import StopCause
@@ -21,6 +22,9 @@ from planarm_sim.recording import NO_WATCH, TRACED_PINS, Sink, Watch, write_prof
 from planarm_wire import messages
 
 __all__ = ["TRACED_PINS", "Emulation", "Stop", "Watch", "emulate", "run_board"]
+
+COMPILING_CYCLES = 20_000
+"""Enough for every part of a bench to have run."""
 
 DEBUGGER_WAIT_S = 0.05
 """How long a board that a debugger holds may not notice that it is to stop."""
@@ -39,6 +43,7 @@ class Emulation:
         program_failed: whether the program ended by itself (undefined opcode, BREAK, asleep for ever).
         warnings: registers of parts that are not modelled which the program touched.
         insight: what watching the program told; None when nobody asked for it.
+        bench: what drivers, motors and arm around the board did; None when there were none.
     """
 
     cycles: int
@@ -49,6 +54,7 @@ class Emulation:
     program_failed: bool
     warnings: tuple[str, ...]
     insight: Insight | None = None
+    bench: BenchReport | None = None
 
     @property
     def ratio(self) -> float:
@@ -67,6 +73,7 @@ def emulate(
     usb: Usb = "16u2",
     seconds: float | None = None,
     reset_on_open: bool = True,
+    around: Callable[[Uno], Bench] | None = None,
     announce: Callable[[str], None],
     say: Callable[[str], None],
 ) -> Emulation:
@@ -82,6 +89,7 @@ def emulate(
         usb: "16u2": with the delays and limits of the board's USB bridge; "direct": without.
         seconds: emulated time to run; None runs on.
         reset_on_open: reset the board whenever a host opens the terminal, as a Uno does.
+        around: puts drivers, motors and an arm around the board.
         announce: takes the terminal's path as soon as it can be opened, before anything else.
         say: takes notices, one line each.
 
@@ -101,6 +109,10 @@ def emulate(
     if watch.symbols is not None:
         load_elf(watch.symbols)  # what is wrong with it is told before anything is announced
     uno.run(cycles=1)  # compiles the chip, or loads it from the cache: a host that opens the terminal need not wait
+    bench = None
+    if around is not None:
+        around(Uno(_load(image_path), bootloader=_load(bootloader))).run(cycles=COMPILING_CYCLES)
+        bench = around(uno)
     with _stopped_by_signals() as stop, PtyLine(link, uno.serial.baud) as line:
         announce(line.path)
         return run_board(
@@ -113,6 +125,7 @@ def emulate(
             seconds=seconds,
             reset_on_open=reset_on_open,
             follow_baud=baud is None,
+            bench=bench,
             say=say,
         )
 
@@ -131,13 +144,15 @@ def run_board(
     speed: Speed = "real",
     seconds: float | None = None,
     reset_on_open: bool = True,
+    bench: Bench | None = None,
     follow_baud: bool = False,
     say: Callable[[str], None],
 ) -> Emulation:
     """As `emulate`, with a board, a line, a clock and a way to stop it of the caller's."""
     if watch.profile is not None:
         uno.observe(symbols=watch.symbols, keep_intervals=False)
-    uno.run(cycles=1)  # compiles the chip, if nobody has: seconds that are nobody's lag
+    machine = uno if bench is None else bench
+    machine.run(cycles=1)  # compiles the chip, if nobody has: seconds that are nobody's lag
     start_cycle, start_s = uno.cycle, clock.now_s()
     with ExitStack() as stack:
         sink = stack.enter_context(Sink(uno, watch))
@@ -146,7 +161,7 @@ def run_board(
             debugger = stack.enter_context(GdbServer(watch.gdb_port, uno.debug_target))
             say(f"avr-gdb attaches by: target remote localhost:{debugger.port}")
         bridge = Bridge(
-            uno,
+            machine,
             line,
             clock,
             speed=speed,
@@ -168,6 +183,7 @@ def run_board(
         program_failed=failed,
         warnings=uno.warnings,
         insight=insight,
+        bench=bench.report() if bench is not None else None,
     )
 
 

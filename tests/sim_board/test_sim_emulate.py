@@ -18,11 +18,14 @@ import serial
 
 from planarm_sim import Uno
 from planarm_sim.__main__ import main, summary
+from planarm_sim.bench import Bench
 from planarm_sim.bridge import BOOT_S
 from planarm_sim.bridge.pty_line import PtyLine
 from planarm_sim.debug.packets import packet
+from planarm_sim.drivers import wiring_of
 from planarm_sim.emulate import TRACED_PINS, Stop, Watch, emulate, run_board
 from planarm_sim.errors import ImageError
+from planarm_sim.plant import desk_arm
 from planarm_sim.trace import read_vcd
 from sim_board.fake_line import FakeClock, FakeLine
 
@@ -53,6 +56,17 @@ def test_edges_are_counted_and_carried_to_the_waveform_file(tmp_path):
         assert result.rising_edges[pin] == int(edges["level"].sum()) == pytest.approx(1000, abs=1)
     assert set(result.rising_edges) == {"D9", "D10"}
     assert len(uno.edges("D9")) == 0, "carried away, so that memory does not grow"
+
+
+def test_a_bench_around_the_board_moves_with_it_and_is_told_of():
+    clock, uno = FakeClock(), Uno.from_hex(DATA / "pulses.hex")
+    bench = Bench(uno, desk_arm(1), [wiring_of("tmc2209", step="D9", direction="D4", microsteps=64)])
+    result = run_board(uno, FakeLine(clock, []), clock, Stop(), bench=bench, seconds=0.1, say=[].append)
+    assert result.bench == bench.report()
+    assert result.bench.counts[0].pulses == result.rising_edges["D9"]
+    # 64 micro-steps of 200 full steps; DIR is low, so the arm turns clockwise.
+    assert bench.q_rad[0] == pytest.approx(-result.rising_edges["D9"] / 12_800 * 2 * np.pi, abs=0.02)
+    assert "\narm: " in summary(result)
 
 
 def test_what_it_did_is_data():

@@ -68,7 +68,7 @@ def test_acceleration_raised_until_it_fails_says_which_joint_lost_how_many_steps
     assert any(lost)
     assert all(steps % 4 == 0 for steps in lost)
     for joint, steps in enumerate(lost, start=1):
-        told = re.search(rf"joint {joint} lost (\d+) full steps.*?first at ([\d.]+) s, path ([\d.]+) cm", arm.explain())
+        told = re.search(rf"joint {joint} lost (\d+) full steps.*?first at ([\d.]+) s, path ([\d.]+) of", arm.explain())
         assert (told is not None) == any(loss.motor == joint for loss in arm.record.lost)
         if told:
             assert int(told[1]) == abs(steps)

@@ -14,11 +14,15 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
-from planarm_sim.board import CLOCK_HZ, Uno
+from planarm_sim.board import CLOCK_HZ
 from planarm_sim.bridge.line import Clock, Line
 from planarm_sim.errors import UsageError
+
+if TYPE_CHECKING:
+    from planarm_sim.bench import Bench
+    from planarm_sim.board import Uno
 
 __all__ = ["Bridge", "BridgeCounts", "Speed"]
 
@@ -69,7 +73,7 @@ class Bridge:
     """The loop, one `step` at a time.
 
     Args:
-        uno: the board.
+        uno: the board, or the bench around it.
         line: the host's side.
         clock: the time that `speed` "real" follows.
         speed: see the module's text.
@@ -82,7 +86,7 @@ class Bridge:
 
     def __init__(
         self,
-        uno: Uno,
+        uno: Uno | Bench,
         line: Line,
         clock: Clock,
         *,

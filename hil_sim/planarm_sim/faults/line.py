@@ -50,6 +50,29 @@ class FaultyLine:
         """The host's rate."""
         return self._uno.serial.baud
 
+    @baud.setter
+    def baud(self, value: int) -> None:
+        self._uno.serial.baud = value
+
+    @property
+    def host_takes(self) -> bool:
+        """Whether the host takes bytes from the board's USB bridge."""
+        return self._uno.serial.host_takes
+
+    @host_takes.setter
+    def host_takes(self, value: bool) -> None:
+        self._uno.serial.host_takes = value
+
+    @property
+    def bridge(self) -> object | None:
+        """The board's USB bridge; None when the line is direct."""
+        return self._uno.serial.bridge
+
+    @property
+    def room(self) -> int:
+        """Bytes that can be written now without being held back."""
+        return max(0, self._uno.serial.room - len(self._waiting[TO_BOARD]))
+
     @property
     def pending(self) -> int:
         """Bytes written that have not reached the board."""

@@ -6,19 +6,26 @@ import argparse
 import json
 import sys
 from dataclasses import asdict
+from pathlib import Path
 
 from planarm.cli.scenes import tell_first_compile
 from planarm.errors import DeviceFault, EmulatorError
 from planarm.link.released_image import released_image
+from planarm.scene import load_scene
 
 
 def execute(options: argparse.Namespace) -> int:
     """Emulate until stopped; the pty's path is printed first, on stderr when --json keeps stdout for the result."""
     tell_first_compile("planarm_sim")
+    from planarm.link.sim_bench import arm_at_its_start
     from planarm_sim.__main__ import summary, watch_of
     from planarm_sim.emulate import emulate
     from planarm_sim.errors import SimError
 
+    scene = load_scene(options.scene) if options.scene else None
+    if scene is None and options.faults is not None:
+        raise EmulatorError("--faults needs drivers and an arm around the board: give --scene FILE, too")
+    faults = Path(options.faults) if options.faults else None
     talk = sys.stderr if options.json else sys.stdout
     try:
         result = emulate(
@@ -28,6 +35,7 @@ def execute(options: argparse.Namespace) -> int:
             watch=watch_of(options),
             speed=options.speed,
             usb=options.usb,
+            around=None if scene is None else arm_at_its_start(scene, faults, options.fault_seed),
             announce=lambda path: print(path, file=talk, flush=True),
             say=lambda text: print(f"note: {text}", file=sys.stderr, flush=True),
         )

@@ -156,6 +156,13 @@ def _add_emulate(commands: Commands) -> None:
     command = commands.add_parser("emulate", help="run a flash image on the emulated Uno behind a virtual serial port")
     command.add_argument("--firmware", metavar="HEX|ELF", help="the image to run (default: the released firmware)")
     command.add_argument("--bootloader", metavar="HEX|ELF", help="a boot loader, so that avrdude can upload")
+    command.add_argument(
+        "--scene",
+        metavar="SCENE",
+        help="whose drivers, motors and arm stand around the board, at its task's start",
+    )
+    command.add_argument("--faults", metavar="FILE", help="a schedule of what goes wrong (docs/faults.md)")
+    command.add_argument("--fault-seed", type=int, metavar="N", help="in place of the schedule's own seed")
     command.add_argument("--link", metavar="PATH", help="make PATH a link to the pty")
     command.add_argument("--vcd", metavar="FILE", help="write the pins' waveforms")
     command.add_argument("--serial-log", metavar="FILE", help="write every byte on the serial line and its cycles")

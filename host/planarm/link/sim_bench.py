@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from planarm.errors import EmulatorError
 from planarm.link.arm_record import ArmRecord, ArmSetup, BrokenRule, LostSteps, Touch
+from planarm.model.arm import Arm
+from planarm.model.kinematics import inverse_2r
 from planarm.model.shapes import Circle, shape_of
 from planarm.model.transmission import Transmission
 from planarm.scene import JointSpec, Obstacle, Scene
@@ -76,6 +80,20 @@ def build_bench(uno: Uno, setup: ArmSetup) -> tuple[Bench, FaultRunner | None]:
         return bench, inject(bench, load_schedule(setup.faults, setup.fault_seed))
     except SimError as error:
         raise EmulatorError(str(error)) from error
+
+
+def arm_at_its_start(scene: Scene, faults: Path | None, fault_seed: int | None) -> Callable[[Uno], Bench]:
+    """Return what puts the scene's arm around a board, standing where its task starts.
+
+    Raises:
+        EmulatorError: the start is out of the arm's reach.
+    """
+    arm = Arm.from_spec(scene.arm)
+    q_rad = inverse_2r(arm, scene.task.start_cm, "down" if scene.arm.elbow == "down" else "up")
+    if np.isnan(q_rad).any():
+        raise EmulatorError(f"{scene.source}: task.start_cm: {list(scene.task.start_cm)} is out of the arm's reach")
+    usteps = tuple(int(n) for n in np.floor(Transmission.of(scene).usteps(q_rad) + 0.5))
+    return lambda uno: build_bench(uno, ArmSetup(scene, usteps, faults, fault_seed))[0]
 
 
 def rig_of(scene: Scene, start_usteps: tuple[int, ...]) -> Rig:
