@@ -26,6 +26,7 @@ from __future__ import annotations
 
 import functools
 import hashlib
+import importlib
 import importlib.util
 import os
 import re
@@ -35,6 +36,7 @@ import sys
 import tempfile
 import threading
 import time
+import types
 from collections.abc import Callable, Iterator
 from importlib import metadata
 from pathlib import Path
@@ -44,6 +46,7 @@ F = TypeVar("F", bound=Callable[..., Any])
 
 CACHE_DIR_VARIABLE = "PLANARM_CACHE_DIR"
 KEPT_BUILDS = 16
+_BLAS = "scipy.linalg.cython_blas"
 
 _DECORATED = re.compile(rb"^@kernel$", re.M)
 _KEY_NAME = re.compile(r"[0-9a-f]{16}")
@@ -60,9 +63,8 @@ def kernel(function: F) -> F:
     With NUMBA_DISABLE_JIT=1 the plain Python function is returned. Raises OSError when `PLANARM_CACHE_DIR`
     is set to a folder that cannot be written.
     """
-    import numba  # noqa: PLC0415 - half a second, paid by users of kernels only
-
-    config: Any = numba.config
+    numba: Any = _numba()
+    config = numba.config
     if config.DISABLE_JIT:
         return function
     source = Path(function.__code__.co_filename)
@@ -81,9 +83,30 @@ def kernel(function: F) -> F:
     return cast("F", compiled)
 
 
+@functools.cache
 def _edited_since_start(module: str, source: Path) -> bool:
     """Tell whether a file was written after this process began: what is compiled may then not be what it holds."""
     return any(path.stat().st_mtime_ns > _STARTED_NS for path in _closure(module, source).values())
+
+
+@functools.cache
+def _numba() -> types.ModuleType:
+    """Import Numba and its functions of arrays, which ask at once whether SciPy has a BLAS.
+
+    To ask, they import scipy.linalg: a third of a second, for kernels of which none needs a BLAS. Where SciPy is
+    installed an empty module stands for it meanwhile; a kernel that calls np.dot imports the real one when it is
+    compiled.
+    """
+    numba = importlib.import_module("numba")  # here, so that only users of kernels wait for it
+    needless = _BLAS not in sys.modules and importlib.util.find_spec(_BLAS.partition(".")[0]) is not None
+    if needless:
+        sys.modules[_BLAS] = types.ModuleType(_BLAS)
+    try:
+        importlib.import_module("numba.np.arraymath")
+    finally:
+        if needless:
+            del sys.modules[_BLAS]
+    return numba
 
 
 def is_cold(package: str) -> bool:
@@ -164,6 +187,7 @@ def _package_folders(package: str) -> list[Path]:
     return [Path(folder) for folder in (spec.submodule_search_locations or ())] if spec else []
 
 
+@functools.cache
 def _closure(module: str, source: Path) -> dict[str, Path]:
     """Return the file, by dotted module name, of everything that can take part in the module's compiled code."""
     found = {module: source} if source.is_file() else {}
@@ -184,10 +208,22 @@ def _module_name(package: str, folder: Path, path: Path) -> str:
 @functools.cache
 def _imported_modules(name: str, path: Path, package: str) -> tuple[tuple[str, Path], ...]:
     """Return the modules of `package` and of `planarm_wire`, with their files, that imports at the left margin name."""
-    roots = {package: _package_folders(package), "planarm_wire": [Path(__file__).parent]}
+    files: dict[str, Path] = {}
+    for top in dict.fromkeys((package, "planarm_wire")):
+        files |= _modules(top)
     named = dict.fromkeys(_read_imports(name, _text(path)))
-    files = ((imported, _find_module(imported, roots)) for imported in named if imported.partition(".")[0] in roots)
-    return tuple((imported, file) for imported, file in files if file is not None)
+    return tuple((imported, files[imported]) for imported in named if imported in files)
+
+
+@functools.cache
+def _modules(package: str) -> dict[str, Path]:
+    """Return the files of a package by dotted module name, found once: to ask the disk for each name takes longer."""
+    folders = [Path(__file__).parent] if package == "planarm_wire" else _package_folders(package)
+    found: dict[str, Path] = {}
+    for folder in folders:
+        for path in folder.rglob("*.py"):
+            found.setdefault(_module_name(package, folder, path), path)
+    return found
 
 
 def _read_imports(name: str, text: bytes) -> Iterator[str]:
@@ -203,14 +239,6 @@ def _read_imports(name: str, text: bytes) -> Iterator[str]:
         for target in targets:
             yield target
             yield f"{target}.__init__"
-
-
-def _find_module(name: str, roots: dict[str, list[Path]]) -> Path | None:
-    top, *rest = name.split(".")
-    if not rest:
-        return None
-    paths = (folder.joinpath(*rest).with_suffix(".py") for folder in roots.get(top, ()))
-    return next((path for path in paths if path.is_file()), None)
 
 
 @functools.cache

@@ -48,13 +48,13 @@ def package(tmp_path: Path) -> Path:
     return folder
 
 
-def run(package: Path, cache: Path, **settings: str) -> list[str]:
-    """Run PROGRAM in a fresh interpreter and return its words."""
+def run(package: Path, cache: Path, program: str = PROGRAM, **settings: str) -> list[str]:
+    """Run a program in a fresh interpreter and return its words."""
     kept = {k: v for k, v in os.environ.items() if not k.startswith(("NUMBA_", "PLANARM_", "XDG_"))}
     settings.setdefault("PLANARM_CACHE_DIR", str(cache))
     path = os.pathsep.join((str(package.parent), str(WIRE_FOLDER)))
     done = subprocess.run(
-        [sys.executable, "-c", PROGRAM],
+        [sys.executable, "-c", program],
         env={**kept, "PYTHONPATH": path, "PYTHONDONTWRITEBYTECODE": "1", **settings},
         capture_output=True,
         text=True,
@@ -112,6 +112,22 @@ def test_a_read_only_install_is_cached_for_the_user(package: Path, tmp_path: Pat
         assert sorted(p.relative_to(package) for p in package.rglob("*")) == before, "nothing beside the sources"
     finally:
         package.chmod(0o755)
+
+
+def test_kernels_do_not_import_scipys_algebra_until_one_needs_it(package: Path, tmp_path: Path) -> None:
+    look = """
+import sys
+import arm_kernels.caller as caller
+assert caller.answer(1) == 3
+before = "scipy.linalg" in sys.modules or "scipy.linalg.cython_blas" in sys.modules
+import numpy as np
+from arm_kernels.callee import product
+print(before, product(np.array([1.0, 2.0]), np.array([3.0, 4.0])), "scipy.linalg" in sys.modules)
+"""
+    pytest.importorskip("scipy")
+    callee = package / "callee.py"
+    callee.write_text(callee.read_text() + "\n\n@kernel\ndef product(a, b):\n    return a @ b\n")
+    assert run(package, tmp_path / "cache", program=look) == ["False", "11.0", "True"]
 
 
 def test_without_jit_the_plain_function_runs_and_nothing_is_written(package: Path, tmp_path: Path) -> None:

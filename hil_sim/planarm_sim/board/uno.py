@@ -10,7 +10,7 @@ import copy
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Self
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,13 +19,15 @@ from planarm_sim.board.pins import PINS, PinPlace, pin_place
 from planarm_sim.board.serial import CLOCK_HZ, FRAME_BITS, SerialPort, SerialState, Usb
 from planarm_sim.cpu.chip import EDGE_DTYPE, Chip, ResetCause, Snapshot, StopCause
 from planarm_sim.cpu.layout import NEVER
-from planarm_sim.debug import GdbServer, Target, serve
 from planarm_sim.errors import LimitError, PinError, StoppedError, UsageError
-from planarm_sim.insight import Insight, Observer
 from planarm_sim.loader import Image, join_bootloader, load_elf, load_hex, load_image
 from planarm_sim.peripherals.adc import AREF
 from planarm_sim.trace import EDGE, VcdWriter
 from planarm_wire import messages
+
+if TYPE_CHECKING:
+    from planarm_sim.debug import Target
+    from planarm_sim.insight import Insight, Observer
 
 __all__ = ["CLOCK_HZ", "AnalogInput", "Pin", "Uno", "UnoSnapshot"]
 
@@ -351,6 +353,8 @@ class Uno:
         Raises:
             ImageError: `symbols` cannot be read.
         """
+        from planarm_sim.insight import Observer  # noqa: PLC0415 - a start need not wait for it
+
         functions = self._symbols if symbols is None else load_elf(symbols).symbols
         self._observer = Observer(functions, keep_intervals=keep_intervals)
         self._observer.begin(self.cycle)
@@ -383,6 +387,8 @@ class Uno:
 
     def debug_target(self) -> Target:
         """The board as a debugger sees it; see `planarm_sim.debug`."""
+        from planarm_sim.debug import Target  # noqa: PLC0415 - a start need not wait for it
+
         return Target(self._chip, self._observer)
 
     def serve_gdb(self, port: int = 0, *, announce: Callable[[int], None] = lambda _port: None) -> None:
@@ -397,6 +403,7 @@ class Uno:
         Raises:
             BridgeError: the port cannot be had.
         """
+        from planarm_sim.debug import GdbServer, serve  # noqa: PLC0415 - a start need not wait for it
 
         def run_slice(cycles: int) -> StopCause:
             cause = self._chip.run_to(self._chip.cycle + cycles)
