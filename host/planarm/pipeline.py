@@ -8,7 +8,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator
 from contextlib import closing, contextmanager
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
@@ -28,9 +28,11 @@ from planarm.errors import (
 from planarm.fastest.task import fastest_path
 from planarm.link.arm_record import ArmSetup, ArmTrace
 from planarm.link.exchange import StreamResult, stream_plan
+from planarm.link.stream import StreamOptions
 from planarm.link.transport import PinTrace, Transport, open_transport
 from planarm.model.arm import Arm
 from planarm.model.kinematics import forward
+from planarm.model.transmission import motor_axes
 from planarm.plan import Findings, Plan
 from planarm.plan_file import StoredPlan
 from planarm.route import find_route
@@ -42,6 +44,7 @@ from planarm.stepping.quantise import quantisation_bound_cm
 from planarm.stepping.schedule import schedule
 from planarm.stepping.segments import SegmentPlan, expand
 from planarm.stepping.slowing import SpeedLimit
+from planarm.stepping.windows import start_stop_ticks
 from planarm.summary import summarise
 from planarm.trajectory.binding import report_timing
 from planarm.trajectory.limits import Limits
@@ -177,8 +180,9 @@ def run_scene(
     begin_run_folder(out, stored(plan))
     setup = ArmSetup(scene, plan.segments.start_usteps, faults, fault_seed)
     with closing(open_transport(port, scene.link.baud, setup)) as transport:
+        intervals = tuple(start_stop_ticks(axis) for axis in motor_axes(scene.joints, scene.coupling))
         with telling_of_the_arm(plan, transport):
-            streamed = stream(plan.segments, plan.certificate, transport, notice)
+            streamed = stream(plan.segments, plan.certificate, transport, notice, intervals)
         findings = judge_pins(plan.segments, transport.pins) if transport.pins else None
         arm = judge_emulated_arm(plan, findings, transport.arm) if findings and transport.arm else None
     summary = summarise(plan, streamed, findings, arm)
@@ -190,8 +194,16 @@ def run_scene(
     return summary
 
 
-def stream(plan: SegmentPlan, certificate: Certificate, transport: Transport, notice: Notice) -> StreamResult:
+def stream(
+    plan: SegmentPlan,
+    certificate: Certificate,
+    transport: Transport,
+    notice: Notice,
+    intervals_ticks: tuple[int, ...] = (),
+) -> StreamResult:
     """Stream a certified plan and wait until the device has executed it.
+
+    `intervals_ticks` are the motors' at their start-stop speeds; without them the device takes its default.
 
     Raises:
         CertificateError: The certificate is red; nothing is sent.
@@ -201,7 +213,10 @@ def stream(plan: SegmentPlan, certificate: Certificate, transport: Transport, no
     """
     if not certificate.ok:
         raise CertificateError(certificate.explain())
-    return stream_plan(transport, plan.segments, lambda told: notice("stream", told.path_s / told.total_s))
+    # The need is not told: a fast arm's stop takes more road than the queue holds, and the device would run slowly.
+    allowances = tuple(replace(allowance, need_ticks=0.0) for allowance in plan.allowances)
+    options = StreamOptions(allowances=allowances, start_stop_ticks=intervals_ticks)
+    return stream_plan(transport, plan.segments, lambda told: notice("stream", told.path_s / told.total_s), options)
 
 
 def judge_pins(plan: SegmentPlan, trace: PinTrace) -> Findings:

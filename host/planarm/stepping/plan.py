@@ -3,15 +3,9 @@
 from dataclasses import dataclass
 
 from planarm_wire.messages import Segment
+from planarm_wire.rates import Allowance
 
-
-@dataclass(frozen=True, slots=True)
-class Allowance:
-    """How the path clock may change in one segment, and the path time to rest from its start."""
-
-    slow_per_s: float
-    fast_per_s: float
-    need_ticks: float
+__all__ = ["Allowance", "SegmentPlan"]
 
 
 @dataclass(frozen=True, slots=True)
