@@ -79,10 +79,10 @@ def plan_scene(scene: Scene, notice: Notice) -> Plan:
     route = find_route(scene, margin_cm)
     notice("plan", 0.4)
     limits = Limits.of(scene)
-    trajectory, path = fastest_motion(route.smooth, limits), route.path
+    trajectory, path, bound_cm = fastest_motion(route.smooth, limits), route.path, route.bound_cm
     if scene.planner.objective == "time":
         trajectory = optimised(scene, margin_cm, trajectory, limits, notice)
-        path = TipPath.through(tip_curve_cm(trajectory, Arm.from_spec(scene.arm)), path.elbow)
+        path, bound_cm = TipPath.through(tip_curve_cm(trajectory, Arm.from_spec(scene.arm)), path.elbow), None
     fastest = trajectory
     notice("plan", 0.6)
     trajectory, train, segments = schedule(scene, lambda limit: timed(scene, fastest, limits, limit))
@@ -102,6 +102,7 @@ def plan_scene(scene: Scene, notice: Notice) -> Plan:
         timing=report_timing(trajectory, limits),
         search_ms=1e3 * route.search_s,
         joint=route.joint,
+        bound_cm=bound_cm,
     )
 
 

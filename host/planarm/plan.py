@@ -37,6 +37,15 @@ class Plan:
     """Wall time of the grid search alone."""
     joint: JointRoute | None = None
     """The way-points of a route in joint space."""
+    bound_cm: float | None = None
+    """No path of the tip on the map is shorter; None where the path was searched, or optimised, in joint space."""
+
+    def length_figures(self) -> dict[str, float | None]:
+        """The path's length, its proven lower bound, and by how many per cent the path can be longer than the best."""
+        length_cm, bound_cm = self.path.length_cm, self.bound_cm
+        gap = None if not bound_cm else round(100.0 * max(0.0, length_cm / bound_cm - 1.0), 4)
+        bound = None if not bound_cm else round(bound_cm, 6)
+        return {"path_length_cm": round(length_cm, 6), "path_bound_cm": bound, "path_gap_percent": gap}
 
 
 @dataclass(frozen=True, slots=True)

@@ -35,6 +35,8 @@ class Route:
     search_s: float
     joint: JointRoute | None = None
     """The way-points of a route in joint space."""
+    bound_cm: float | None = None
+    """No path of the tip on the allowed sides' maps is shorter (docs/planners.md); None in joint space."""
 
 
 def find_route(scene: Scene, margin_cm: float) -> Route:
@@ -54,6 +56,7 @@ def find_route(scene: Scene, margin_cm: float) -> Route:
 def tip_route(scene: Scene, margin_cm: float) -> Route:
     """Return the route along the shortest path of the tip on any allowed elbow side; errors as `find_route`."""
     found: list[tuple[FreeMap, Path, float]] = []
+    bounds_cm = []
     for side in elbow_sides(scene.arm):
         try:
             free_map = build_free_map(scene, margin_cm, side)
@@ -63,10 +66,11 @@ def tip_route(scene: Scene, margin_cm: float) -> Route:
         result = find_path(free_map, scene.task.start_cm, scene.task.goal_cm, scene.planner)
         if result.path is not None:
             found.append((free_map, result.path, result.plan_s))
+            bounds_cm.append(result.bound_cm)
     if not found:
         raise no_path(scene, diagnose(scene, margin_cm))
     free_map, path, search_s = min(found, key=lambda one: one[1].length_cm)
-    return Route(free_map, path, smoothed(scene, free_map, path), search_s)
+    return Route(free_map, path, smoothed(scene, free_map, path), search_s, bound_cm=min(bounds_cm))
 
 
 def joint_route(scene: Scene, margin_cm: float, spec: JointSpaceSpec) -> Route:

@@ -40,7 +40,7 @@ def summarise(
         "moves": scene.planner.moves,
         "space": "tip" if plan.joint is None else "joint",
         "elbow_changes": 0 if plan.joint is None else len(plan.joint.changes_cm),
-        "path_length_cm": round(plan.path.length_cm, 6),
+        **plan.length_figures(),
         "search_ms": round(plan.search_ms, 3),
         "plan_ms": round(plan.plan_ms, 3),
         "objective": scene.planner.objective,

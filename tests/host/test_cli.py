@@ -67,7 +67,12 @@ def test_either_elbow_takes_the_shorter_way(capsys, tmp_path):
         scene.write_text(text.replace('elbow = "up"', f'elbow = "{elbow}"'))
         code, out, _ = leave(capsys, "plan", str(scene), "-o", str(tmp_path / "x.plan"), "--json")
         if code == 0:
-            lengths[elbow] = json.loads(out)["path_length_cm"]
+            told = json.loads(out)
+            lengths[elbow] = told["path_length_cm"]
+            assert told["path_bound_cm"] <= told["path_length_cm"]
+            assert told["path_gap_percent"] == pytest.approx(
+                100 * (told["path_length_cm"] / told["path_bound_cm"] - 1), abs=1e-4
+            )
     assert lengths["either"] == min(lengths.values())
 
 

@@ -55,7 +55,7 @@ def execute(options: argparse.Namespace) -> int:
         raise CertificateError(f"{target}: {plan.certificate.explain()}")
     told: dict[str, Any] = {
         "plan": str(target),
-        "path_length_cm": plan.path.length_cm,
+        **plan.length_figures(),
         **plan.timing.figures(),
         "segments": len(plan.segments.segments),
         "plan_ms": plan.plan_ms,
