@@ -1,0 +1,226 @@
+"""What the firmware does, beside its peers: `./dev bench firmware [--seconds 10]`.
+
+Everything of ours is measured here, on the released image on the emulated Uno; deviations are those of every rising edge
+from its scheduled 62.5 ns tick. The peers' figures were measured once, two axes at 1 : 0.618 on one corrected simulator.
+"""
+
+import argparse
+import json
+import sys
+from pathlib import Path
+
+from rich import box
+from rich.console import Console
+from rich.table import Table
+
+ROOT = Path(__file__).parents[1]
+sys.path[:0] = [str(ROOT / "tests"), str(ROOT / "tests" / "firmware")]
+
+from test_firmware_stretch import FAST, SEGMENT_TICKS, Player  # noqa: E402
+from test_firmware_uno import Streamer, fast  # noqa: E402
+
+from firmware_board import LEAD_TICKS, Board, EmulatedFirmware, Schedule, end_motion  # noqa: E402 - the tests' board
+from planarm_wire.codec import encode, encoded_bytes  # noqa: E402
+from planarm_wire.framing import encode_frame  # noqa: E402
+from planarm_wire.messages import (  # noqa: E402
+    BAUD,
+    DELIMITER,
+    EMERGENCY_CODE,
+    EMERGENCY_REPEATS,
+    HOLD_CODE,
+    HOST_WINDOW_BYTES,
+    MIN_INTERVAL_TICKS,
+    QUEUE_BYTES,
+    QUEUE_FRAME_BYTES,
+    STEP_PINS,
+    TICKS_HZ,
+    Fault,
+    Segments,
+    Start,
+)
+from stretch_motion import Profile  # noqa: E402
+
+IMAGE = ROOT / "firmware" / "release" / "uno.hex"
+TOLD = json.loads((ROOT / "firmware" / "release" / "uno.json").read_text(encoding="utf-8"))
+BYTE_TICKS = 10 * TICKS_HZ // BAUD
+PEERS = (
+    ("", "planarm", "GRBL 1.1h", "FastAccelStepper", "Klipper MCU"),
+    ("highest clean rate, both axes", "{ceiling}", "29 k", "37.6 k (53.3 k, cap lifted)", "44.9 k / 20.9 k streaming"),
+    ("jitter at 20 k, second axis: max", "{jitter}", "25 us", "0", "21 us"),
+    ("step interrupt, cycles", "{step}", "335-410", "120 / 135", "266-654"),
+    ("flash", f"{TOLD['flash_bytes']}", "29,864", "12,840", "12,468"),
+    ("static SRAM + deepest stack", "{memory}", "1633 + 232", "644 + 150", "398 + 63"),
+)
+
+
+def main() -> None:
+    """Measure and print two tables."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else "")
+    parser.add_argument("--seconds", type=float, default=10.0, help="length of the runs on a saturated line")
+    seconds = parser.parse_args().seconds
+    rows = [
+        saturated("50,000 : 49,816 steps/s", 320, 1.0037, seconds),
+        saturated("65,041 : 40,170 steps/s", 246, 65_041 / 40_170, seconds),
+        saturated(
+            f"both at {TICKS_HZ // MIN_INTERVAL_TICKS:,} steps/s, the least interval", MIN_INTERVAL_TICKS, 1.0, 2.0
+        ),
+        streamed("65,041 : 64,801 steps/s, the host's window", 246, 1.0037),
+    ]
+    step, stack, interrupts = watched()
+    rows += [interrupts, hold_latency(), emergency_latency(), ring()]
+    table = Table(title="The firmware on the emulated Uno", title_justify="left", box=box.SIMPLE_HEAD)
+    table.add_column("what")
+    table.add_column("found")
+    for row in rows:
+        table.add_row(*row)
+    console = Console(width=150)
+    console.print(table)
+    filled = {
+        "ceiling": "the rows above",
+        "jitter": "0 (rows above)",
+        "step": step,
+        "memory": f"{TOLD['sram_bytes']} + {stack}",
+    }
+    peers = Table(title="Beside its peers", title_justify="left", box=box.SIMPLE_HEAD)
+    for name in PEERS[0]:
+        peers.add_column(name)
+    for row in PEERS[1:]:
+        peers.add_row(*(cell.format(**filled) for cell in row))
+    console.print(peers)
+
+
+def deviation(board: Board, motion: list) -> str:
+    """The largest deviation of any rising edge from its tick, and what is missing."""
+    schedule = Schedule.of(motion)
+    begin = board.rises(0)[0] - schedule.steps[0][0][0]
+    worst = missing = edges = 0
+    for joint in range(2):
+        found, planned = board.rises(joint), [begin + tick for tick, _ in schedule.steps[joint]]
+        edges += len(found)
+        missing += len(planned) - len(found)
+        worst = max([worst, *(abs(a - b) for a, b in zip(found, planned, strict=False))])
+    highs = [
+        fall.tick - rise.tick
+        for joint in range(2)
+        for rise, fall in _pulses([e for e in board.edges if e.pin == STEP_PINS[joint]])
+    ]
+    return f"{worst} cycles on {edges:,} edges, {missing} missing; high {min(highs)} to {max(highs)} cycles"
+
+
+def _pulses(edges: list) -> list:
+    return list(zip(edges[::2], edges[1::2], strict=False))
+
+
+def saturated(name: str, interval: int, ratio: float, seconds: float) -> tuple[str, str]:
+    """Steps at constant rates while valid frames fill the line without a gap."""
+    duration = 30_000 * interval
+    motion = end_motion(fast(interval, ratio, duration, max(1, round(seconds * TICKS_HZ / duration))))
+    firmware = EmulatedFirmware(IMAGE)
+    board = Board(firmware)
+    board.get_ready()
+    for segment in motion:
+        board.ask(Segments(0, 0, 0, (segment,)))
+    board.ask(Start(LEAD_TICKS))
+    frame = encode_frame(board.seq - 1, *encode(Segments(0, 0, 0, (motion[0],))))
+    end = board.now + LEAD_TICKS + duration * len(motion) + 100_000
+    while board.now < end:
+        while firmware.uno.serial.pending < HOST_WINDOW_BYTES:
+            board.receive(frame)
+        board.run(40_000)
+    board.run(200_000)
+    board.receive(bytes([DELIMITER]))
+    status = board.ask()
+    told = deviation(board, motion) if status.fault is Fault.NONE else f"{status.fault.name}"
+    return (
+        f"{name}, {duration * len(motion) / TICKS_HZ:.1f} s, line saturated",
+        f"{told}; {status.overruns} bytes lost in the USART",
+    )
+
+
+def streamed(name: str, interval: int, ratio: float) -> tuple[str, str]:
+    """Steps at constant rates, streamed within the host's window of 112 bytes."""
+    motion = end_motion(fast(interval, ratio, 64_000, 250))
+    board = Board(EmulatedFirmware(IMAGE))
+    board.get_ready()
+    for segment in motion[:16]:
+        board.ask(Segments(0, 0, 0, (segment,)))
+    board.ask(Start(LEAD_TICKS))
+    status = Streamer(board, motion[16:], busy_line=True).run(len(motion), 64_000 * 300)
+    told = deviation(board, motion) if status.fault is Fault.NONE else f"{status.fault.name}"
+    return name, f"{told}; {status.overruns + status.ring_full} bytes lost"
+
+
+def watched() -> tuple[str, int, tuple[str, str]]:
+    """Interrupts and stack while both joints run at 50,000 steps/s and are streamed to."""
+    motion = end_motion(fast(320, 1.0037, 64_000, 60))
+    firmware = EmulatedFirmware(IMAGE)
+    board = Board(firmware)
+    board.get_ready()
+    firmware.uno.observe(keep_intervals=False)
+    for segment in motion[:16]:
+        board.ask(Segments(0, 0, 0, (segment,)))
+    board.ask(Start(LEAD_TICKS))
+    Streamer(board, motion[16:], busy_line=True).run(len(motion), 64_000 * 100)
+    insight = firmware.uno.insight()
+    entry = 4
+    most = {figures.name: figures.duration_cycles.most + entry for figures in insight.interrupts}
+    cells = ", ".join(f"{name} {cycles}" for name, cycles in sorted(most.items()))
+    step = f"{max(most['TIMER1_COMPA'], most['TIMER1_COMPB'])} at most"
+    return (
+        step,
+        insight.deepest_stack_bytes,
+        ("longest interrupts, entry included", f"{cells}; load {insight.interrupt_share:.2f}"),
+    )
+
+
+def hold_latency() -> tuple[str, str]:
+    """From the end of the hold byte to the first stretched interval."""
+    worst = 0.0
+    for phase in range(0, SEGMENT_TICKS, SEGMENT_TICKS // 6):
+        player = Player(EmulatedFirmware(IMAGE), FAST)
+        player.start()
+        player.play_until(player.board.now + 25 * SEGMENT_TICKS)
+        player.board.run(phase)
+        player.board.receive(bytes([HOLD_CODE]))
+        held = player.board.now + BYTE_TICKS
+        player.board.run(200_000)
+        begin = player.board.rises(0)[0] - Schedule.of(FAST.segments).steps[0][0][0]
+        planned = [begin + tick for tick, _ in Schedule.of(FAST.segments).steps[0]]
+        first = next(a for a, b in zip(player.board.rises(0), planned, strict=False) if a != b)
+        worst = max(worst, (first - held) / TICKS_HZ * 1000)
+    limit = SEGMENT_TICKS / TICKS_HZ * 1000 + 4
+    return "hold byte to the first stretched interval", f"{worst:.2f} ms at most in 6 phases; limit {limit:.2f} ms"
+
+
+def emergency_latency() -> tuple[str, str]:
+    """From the end of the last emergency byte's stop bit to the last edge."""
+    worst = -1e9
+    for phase in range(0, 320, 20):
+        firmware = EmulatedFirmware(IMAGE)
+        board = Board(firmware)
+        board.get_ready()
+        board.ask(Segments(0, 0, 0, (fast(320, 1.0037, 3_000_000, 1)[0],)))
+        board.send(Start(LEAD_TICKS))
+        board.run(300_000 + phase)
+        board.receive(bytes([EMERGENCY_CODE] * EMERGENCY_REPEATS))
+        stop_bit = board.now + EMERGENCY_REPEATS * BYTE_TICKS
+        board.run(50_000)
+        last = max(edge.tick for edge in board.edges if edge.pin in STEP_PINS)
+        worst = max(worst, (last - stop_bit) / TICKS_HZ * 1e6)
+    return "emergency byte's stop bit to the last edge", f"{worst:+.1f} us at most in 16 phases; limit 30 us"
+
+
+def ring() -> tuple[str, str]:
+    """Path time that the queue holds of a hard motion: two joints, 20 k steps/s."""
+    motion = Profile((20_000.0, 12_360.0), (400_000.0, 400_000.0), 0.8, 30).motion()
+    used = count = 0
+    for head, first, second in zip(motion.heads[::2], motion.segments[::2], motion.segments[1::2], strict=False):
+        used += encoded_bytes(Segments(*head, (first,))) + encoded_bytes(second) + QUEUE_FRAME_BYTES
+        if used > QUEUE_BYTES:
+            break
+        count += 2
+    return "path time in the queue, two joints at 20 k steps/s", f"{count * SEGMENT_TICKS / TICKS_HZ * 1000:.0f} ms"
+
+
+if __name__ == "__main__":
+    main()
