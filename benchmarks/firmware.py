@@ -1,7 +1,8 @@
 """What the firmware does, beside its peers: `./dev bench firmware [--seconds 10]`.
 
-Everything of ours is measured here, on the released image on the emulated Uno; deviations are those of every rising edge
-from its scheduled 62.5 ns tick. The peers' figures were measured once, two axes at 1 : 0.618 on one corrected simulator.
+Everything of ours is measured here, on the released image on the emulated Uno; deviations are those of every rising
+edge from its scheduled 62.5 ns tick. The peers' figures were measured once, two axes at 1 : 0.618 on one corrected
+simulator.
 """
 
 import argparse
