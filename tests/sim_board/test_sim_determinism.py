@@ -64,10 +64,10 @@ def state_of(uno):
 
 
 @pytest.mark.parametrize("usb", ["direct", "16u2"])
-def test_slices_do_not_matter(usb):
+def test_slices_do_not_matter(usb, sized):
     fresh = Uno.from_hex(IMAGE, usb=usb).fork
 
-    @settings(deadline=None, max_examples=25)
+    @settings(deadline=None, max_examples=sized(25, 500))
     @given(INPUTS, SLICES)
     def check(inputs, slices):
         whole, sliced = fresh(2)
@@ -76,18 +76,21 @@ def test_slices_do_not_matter(usb):
     check()
 
 
-@settings(deadline=None, max_examples=15)
-@given(INPUTS, st.integers(0, END), st.integers(0, 3))
-def test_forks_go_on_as_the_board_itself_would(inputs, at, others):
-    before, after = [i for i in inputs if i[0] < at], [i for i in inputs if i[0] >= at]
-    trunk = play(Uno.from_hex(IMAGE, usb="16u2"), before, until=at)
-    kept = state_of(trunk)
-    *bystanders, chosen = trunk.fork(others + 1)
-    for bystander in bystanders:
-        play(bystander, [(at, ("D2", 1)), (at + 1, HELLO)])
-    forked = state_of(play(chosen, after))
-    assert state_of(trunk) == kept, "the board itself has not moved"
-    assert state_of(play(trunk, after)) == forked
+def test_forks_go_on_as_the_board_itself_would(sized):
+    @settings(deadline=None, max_examples=sized(15, 300))
+    @given(INPUTS, st.integers(0, END), st.integers(0, 3))
+    def check(inputs, at, others):
+        before, after = [i for i in inputs if i[0] < at], [i for i in inputs if i[0] >= at]
+        trunk = play(Uno.from_hex(IMAGE, usb="16u2"), before, until=at)
+        kept = state_of(trunk)
+        *bystanders, chosen = trunk.fork(others + 1)
+        for bystander in bystanders:
+            play(bystander, [(at, ("D2", 1)), (at + 1, HELLO)])
+        forked = state_of(play(chosen, after))
+        assert state_of(trunk) == kept, "the board itself has not moved"
+        assert state_of(play(trunk, after)) == forked
+
+    check()
 
 
 def test_a_fork_has_its_own_memory_flash_and_watch():
