@@ -43,11 +43,9 @@ def solve(train: StepTrain, coding: Coding) -> tuple[int, list[tuple[tuple[int, 
     none, end = tuple(0 for _ in tables), tuple(len(table.low) for table in tables)
     best = {(none, 0): (0, None)}
     for counts in sorted(product(*(range(n + 1) for n in end)), key=sum):
-        # By tick: a border may follow another with the same counts, with rests between them.
-        done: set[tuple[tuple[int, ...], int]] = set()
-        while waiting := sorted(key for key in best if key[0] == counts and key not in done):
-            _extend(tables, coding, train.duration_ticks, best, waiting[0])
-            done.add(waiting[0])
+        # By tick: a border may follow another with the same counts, a rest between them.
+        for at in sorted(key for key in best if key[0] == counts):
+            _extend(tables, coding, train.duration_ticks, best, at)
     at = (end, train.duration_ticks)
     borders = []
     cost = best[at][0]
