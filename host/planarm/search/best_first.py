@@ -260,9 +260,12 @@ def expand(  # noqa: C901, PLR0912, PLR0915 - one flat loop: a call that hands o
                 continue
             to_g = from_g + cost[k]
             if before > WHOLE_ROOM:
-                if to_g + 1 >= g[to]:
+                known = g[to]
+                if to_g + 1 >= known:
                     continue
-                if before >= CHECKED and not move_is_legal(lattice, moves, rules, world, to, k):
+                # An expanded node's way is legal and others lead on from it: it gives way to a legal one only.
+                held = before >= CHECKED or (known & 1 == 0 and rules.legal != NODES)
+                if held and not move_is_legal(lattice, moves, rules, world, to, k):
                     continue
             to_f = to_g + norm(planes, x + dx[k], y + dy[k])
             if to_f >= best:
