@@ -87,6 +87,7 @@ def _draw_pull_out(target: Path) -> None:
     axes.set_ylim(0.0)
     axes.legend(frameon=False)
     set_title(axes, "Pull-out of the emulated motor", "dashed: V / (2 L I); 2.8 mH, 1.7 A, 1/16 steps")
+    save(figure, target)
 
 
 GROWTH_CELLS_CM = (2.0, 1.0, 0.5, 0.25, 0.125)

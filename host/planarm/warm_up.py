@@ -44,6 +44,11 @@ max_acceleration_deg_s2 = 2000
 """
 
 
+PLANNERS = ("", '[planner]\nalgorithm = "a_star"\n')
+"""The default, and one whose paths have corners that are no obstacle's."""
+
+
 def warm_up() -> None:
-    """Plan the small scene once; the first time on a machine this compiles, later it loads from the cache."""
-    plan_scene(parse_scene(SMALL_SCENE, "warm-up"), lambda _stage, _share: None)
+    """Plan the small scene; the first time on a machine this compiles, later it loads from the cache."""
+    for planner in PLANNERS:
+        plan_scene(parse_scene(SMALL_SCENE + planner, "warm-up"), lambda _stage, _share: None)

@@ -104,7 +104,7 @@ def test_the_line_carries_what_250000_baud_can(line):
     segments = motion(400, ticks=25_000)
     result = stream_plan(line, segments)
     assert_pins_show(line, segments)
-    assert result.least_queued >= 15
+    assert result.least_queued >= 8  # a quarter of the 33 such segments that the ring's bytes hold
     assert result.bytes_sent / result.motion_s > 15_000
 
 

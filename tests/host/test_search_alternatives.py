@@ -75,7 +75,7 @@ def test_with_one_elbow_side_all_the_way_there_is_one_route_and_it_is_the_plan()
     (only,) = [one for one in alternatives(scene, planning_margin_cm(scene), 5) if one.elbow_changes == 0]
     plan = plan_scene(scene, lambda _stage, _share: None)
     assert only.path.length_cm == pytest.approx(plan.path.length_cm)
-    assert only.motion_s == pytest.approx(plan.trajectory.duration_s)
+    assert only.motion_s <= plan.trajectory.duration_s + 1e-9  # the plan may be slowed where a stop lacks road
     assert (only.elbow, only.elbow_changes) == (("up", "up"), 0)
 
 

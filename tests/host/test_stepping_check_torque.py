@@ -30,6 +30,7 @@ def random_mechanics(rng, links):
         viscous_friction_nm_s=draw(0.0, 0.1),
         backlash_rad=(0.0,) * links,
         stiffness_nm_rad=(1000.0,) * links,
+        hard_stops_rad=((-np.inf, np.inf),) * links,
     )
 
 
@@ -62,7 +63,10 @@ def test_motors_share_the_joints_torques_by_their_coupling():
 
 def test_a_payload_held_out_in_gravity_is_its_weight_times_the_lever():
     """2 kg at 0.5 m on joint 1's motor, 0.40 N m x 1.2 A / (sqrt 2 x 1.7 A), geared 5 : 1; the motion hardly moves."""
-    bare = MechanicsSpec(True, (1e-9, 1e-9), (0.5, 0.5), (0.0, 0.0), (0.0, 2.0), (0.0, 0.0), (0.0, 0.0), (0, 0), (1, 1))
+    free = ((-np.inf, np.inf),) * 2
+    bare = MechanicsSpec(
+        True, (1e-9, 1e-9), (0.5, 0.5), (0.0, 0.0), (0.0, 2.0), (0.0, 0.0), (0.0, 0.0), (0, 0), (1, 1), free
+    )
     scene = replace(make_scene(), joints=(joint(), joint()), mechanics=bare)
     still = time_path(joint_line((0.0, 0.0), (0.001, 0.001)), [joint(0.001, 0.01)] * 2)
     first, second = check_torque(Planned.of(still), scene)

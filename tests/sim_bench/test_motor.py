@@ -93,7 +93,7 @@ def test_without_current_only_the_detent_torque_holds():
     assert abs(plant.rotors_rad[0]) < math.pi / 2 / 50 / 4
     plant.set_outside_torque(0, 0.031)
     plant.run_to(2 * S)
-    assert plant.rotors_rad[0] > 1.0
+    assert plant.rotors_rad[0] > 0.1  # on its way at sqrt(0.031^2 - 0.030^2) / 0.05 rad/s, past 12 detent positions
 
 
 def test_full_steps_at_the_natural_frequency_swing_far_and_micro_steps_do_not():
