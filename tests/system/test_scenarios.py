@@ -80,7 +80,9 @@ def test_every_kind_of_fault_is_in_some_scenario():
     assert {fault.kind for path in SCENARIOS for fault in load_schedule(path).faults} == set(KINDS)
 
 
-def test_the_same_schedule_gives_the_same_run_and_another_seed_another(plan, tmp_path):
+def test_the_same_schedule_gives_the_same_run_and_another_seed_another(plan, tmp_path, monkeypatch):
+    # A session's nonce is random, and with it how many of its bytes are escaped: here it is the same each time.
+    monkeypatch.setattr("secrets.randbits", lambda bits: 7 % (1 << bits))
     path = tmp_path / "noise.toml"
     path.write_text('seed = 1\nzero = "power_up"\n[[faults]]\nkind = "line.flip"\nshare = 0.02\n')
     first, again = Outcome(plan, path), Outcome(plan, path)
