@@ -139,6 +139,28 @@ def test_a_killed_process_leaves_whole_rows_that_resume_completes(tmp_path):
     assert [row["set.seed"] for row in rows_of(table)] == list(range(400))
 
 
+def test_ctrl_c_ends_with_130_and_keeps_what_finished(tmp_path):
+    written(
+        tmp_path,
+        'kind = "self-test"\nscenes = ["scene.toml"]\nbatch = 1\n[vary]\nseed = { count = 100_000 }\n',
+    )
+    command = [str(Path(sys.executable).with_name("planarm")), "campaign", "campaign.toml", "--out", "out"]
+    with subprocess.Popen(
+        [*command, "--workers", "1"], cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+        start_new_session=True,
+    ) as process:  # fmt: skip
+        deadline = time.monotonic() + 60
+        while len(list((tmp_path / "out").glob("part-*.parquet"))) < 3 and time.monotonic() < deadline:
+            time.sleep(0.02)
+        os.killpg(process.pid, signal.SIGINT)  # as a terminal does: to the workers, too
+        told, said = process.communicate(timeout=60)
+    assert process.returncode == 130, said
+    assert "Traceback" not in said
+    found = rows_of(tmp_path / "out" / JOINED)
+    assert 3 <= len(found) < 100_000
+    assert f"{100_000 - len(found)} runs are missing, --resume goes on with them" in told
+
+
 def test_settings_go_into_the_scene_and_wrong_ones_are_told(tmp_path):
     scene = SceneText("scene.toml", (EXAMPLES / "table1_case1.toml").read_text())
     changed = scene_of(scene, {"planner.seed": 7, "workspace.cell_cm": 0.5, "joints.2.gear_ratio": 4, "seed": 1})
@@ -147,6 +169,17 @@ def test_settings_go_into_the_scene_and_wrong_ones_are_told(tmp_path):
         scene_of(scene, {"planner.sede": 7})
     with pytest.raises(SceneError, match=r"joints\.3\.gear_ratio: '3' is no entry; there are 2"):
         scene_of(scene, {"joints.3.gear_ratio": 4})
+
+
+def test_a_map_run_tells_what_is_free_whatever_the_cell(tmp_path):
+    """Shares of the plane: they hardly change with the cell's size, the number of nodes grows with its square."""
+    scene = SceneText("scene.toml", (EXAMPLES / "table1_case1.toml").read_text())
+    coarse, fine = (run_kind("map", scene, {"workspace.cell_cm": cell}, {})[2] for cell in (1.0, 0.5))
+    assert fine["nodes"] / coarse["nodes"] == pytest.approx(4.0, rel=0.05)
+    for share in ("free_share", "obstacle_share"):
+        assert fine[share] == pytest.approx(coarse[share], abs=0.02)
+    assert coarse["free_nodes"] == round(coarse["free_share"] * coarse["nodes"])
+    assert coarse["whole_share"] < fine["whole_share"] < fine["free_share"]
 
 
 @pytest.mark.parametrize("kind", ["search", "plan"])

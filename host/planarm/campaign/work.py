@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import time
 import tomllib
 from collections.abc import Callable, Mapping
 from copy import deepcopy
 from functools import lru_cache
 from typing import Any
+
+import numpy as np
 
 from planarm.campaign.line_faults import run_line
 from planarm.campaign.task import Figures, SceneText, Value
@@ -16,6 +19,7 @@ from planarm.scene import Scene
 from planarm.scene.load import scene_from_toml
 from planarm.search.grid_search import find_path
 from planarm.workspace.free_map import FreeMap, build_free_map
+from planarm.workspace.world import FREE, LIMIT, OBSTACLE
 
 Outcome = tuple[str, str, Figures]
 """Verdict, reason, figures."""
@@ -29,8 +33,33 @@ def run_kind(kind: str, scene: SceneText, settings: Mapping[str, Value], options
     Raises:
         SceneError: a setting is wrong.
     """
-    work: dict[str, Callable[..., Outcome]] = {"search": run_search, "plan": run_plan, "line": run_line_kind}
+    work: dict[str, Callable[..., Outcome]] = {
+        "map": run_map,
+        "search": run_search,
+        "plan": run_plan,
+        "line": run_line_kind,
+    }
     return work[kind](scene, settings, options)
+
+
+def run_map(scene: SceneText, settings: Mapping[str, Value], _options: Mapping[str, Value]) -> Outcome:
+    """Build the free Cartesian space: how much of it is free, and what forbids the rest."""
+    parsed = scene_of(scene, settings)
+    began_s = time.perf_counter()
+    free_map = build_free_map(parsed, parsed.margin_cm)
+    map_ms = 1e3 * (time.perf_counter() - began_s)
+    nodes = free_map.region.size
+    share = np.bincount(free_map.region.ravel(), minlength=LIMIT + 1) / nodes
+    figures: Figures = {
+        "nodes": nodes,
+        "free_nodes": free_map.free_nodes,
+        "free_share": float(share[FREE]),
+        "obstacle_share": float(share[OBSTACLE]),
+        "limit_share": float(share[LIMIT]),
+        "whole_share": float(np.mean(free_map.whole)),
+        "map_ms": map_ms,
+    }
+    return OK, "", figures
 
 
 def run_search(scene: SceneText, settings: Mapping[str, Value], _options: Mapping[str, Value]) -> Outcome:
