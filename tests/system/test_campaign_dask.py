@@ -38,8 +38,10 @@ def rows_of(table):
     return [{k: v for k, v in row.items() if not k.startswith("took")} for row in rows]
 
 
-def test_a_killed_worker_loses_and_doubles_nothing(tmp_path):
-    campaign = campaign_of(tmp_path, '["answer"]', 300, 3)
+def test_a_killed_worker_loses_and_doubles_nothing(tmp_path, sized):
+    """Small: runs that only answer; full: the 10,000 boards of examples/sweeps/line_faults.toml."""
+    small = campaign_of(tmp_path, '["answer"]', 300, 3)
+    campaign = sized(small, None) or load_campaign(SCENE.parent / "sweeps" / "line_faults.toml")
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         cluster = distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None, processes=True)
@@ -47,7 +49,7 @@ def test_a_killed_worker_loses_and_doubles_nothing(tmp_path):
         killed = []
 
         def kill_once(progress):
-            if progress.finished >= 30 and not killed:
+            if progress.finished >= campaign.size // 10 and not killed:
                 killed.append(next(iter(cluster.workers.values())).pid)
                 os.kill(killed[0], signal.SIGKILL)
 
@@ -55,7 +57,9 @@ def test_a_killed_worker_loses_and_doubles_nothing(tmp_path):
         assert killed and there.whole
         poisoned = campaign_of(tmp_path, '["answer", "crash"]', 2, 2)
         poison = run_campaign(poisoned, engine, tmp_path / "poison", False, lambda _progress: None)
-    here = run_campaign(campaign, LocalEngine(1), tmp_path / "local", False, lambda _progress: None)
+    here = run_campaign(
+        campaign, LocalEngine(sized(1, os.cpu_count() or 1)), tmp_path / "local", False, lambda _progress: None
+    )
     assert rows_of(there.table) == rows_of(here.table)
     assert [row["verdict"] for row in rows_of(poison.table)] == ["ok", "ok", "failed", "failed"]
 
