@@ -1,21 +1,21 @@
-"""The exceptions that planarm raises on purpose, and the exit code of the command line for each.
+"""The exceptions that planarm raises on purpose, each with its code; the code's first digit is the exit code.
 
 ::
 
     PlanarmError
-    ├── UsageError        2  the words of the command line are wrong
-    ├── SceneError        2  the scene file, or a value given in its place, is wrong
-    ├── EmulatorError     2  the emulator cannot start: image, link or file
-    ├── OutputError       2  a file or folder cannot be written
-    ├── PlanFileError     2  the file is no plan, or cannot be read
-    ├── CaptureError      2  the recording of the pins cannot be read, or does not show what is asked
-    ├── NoPathError       3  start and goal are fine, but no collision-free path joins them
-    ├── TimingError       4  the path cannot be timed within the joints' limits
-    ├── CertificateError  4  a check of the finished plan failed
-    ├── LinkError         5  the serial line or its protocol failed; link.position.StreamError tells where the arm is
-    ├── HostKilledError   5  a schedule of faults killed the host
-    ├── DeviceFault       6  the firmware latched a fault or refused a command; so does link.position.StreamFault
-    └── StepsDifferError  7  the executed steps are not the planned ones
+    ├── UsageError        E201  the words of the command line are wrong
+    ├── SceneError        E202  the scene file, or a value given in its place, is wrong
+    ├── EmulatorError     E203  the emulator cannot start: image, link or file
+    ├── OutputError       E204  a file or folder cannot be written
+    ├── PlanFileError     E205  the file is no plan, or cannot be read
+    ├── CaptureError      E206  the recording of the pins cannot be read, or does not show what is asked
+    ├── NoPathError       E301  start and goal are fine, but no collision-free path joins them
+    ├── TimingError       E401  the path cannot be timed within the joints' limits
+    ├── CertificateError  E402  a check of the finished plan failed
+    ├── LinkError         E501  the serial line or its protocol failed; link.position.StreamError tells where the arm is
+    ├── HostKilledError   E502  a schedule of faults killed the host
+    ├── DeviceFault       E601  the firmware latched a fault or refused a command; so does link.position.StreamFault
+    └── StepsDifferError  E701  the executed steps are not the planned ones
 
 Every message names the cause, the place, the value, the limit and the setting to change.
 """
@@ -28,18 +28,33 @@ from typing import Any, ClassVar
 class PlanarmError(Exception):
     """Base of all errors that planarm raises on purpose; `exit_code` is what the command line returns.
 
-    `advice` are sentences on what would help, `fields` what `--json` prints besides; both may be empty.
+    `code` is what `planarm explain` takes. `advice` are sentences on what would help, `fields` what `--json` prints
+    besides; both may be empty.
     """
 
     exit_code: ClassVar[int] = 1
+    code: ClassVar[str] = ""
     advice: tuple[str, ...] = ()
     fields: Mapping[str, Any] = MappingProxyType({})
+
+    def told(self) -> dict[str, Any]:
+        """Return the error as plain values: kind, code, message, exit code, its fields, and its notes."""
+        notes = {"notes": list(self.__notes__)} if hasattr(self, "__notes__") else {}
+        return {
+            **self.fields,
+            "kind": type(self).__name__,
+            **({"code": self.code} if self.code else {}),
+            "message": str(self),
+            "exit_code": self.exit_code,
+            **notes,
+        }
 
 
 class UsageError(PlanarmError):
     """The words of the command line are wrong, or what they name is not there."""
 
     exit_code: ClassVar[int] = 2
+    code: ClassVar[str] = "E201"
 
 
 class SceneError(PlanarmError):
@@ -50,6 +65,7 @@ class SceneError(PlanarmError):
     """
 
     exit_code: ClassVar[int] = 2
+    code: ClassVar[str] = "E202"
 
     def __init__(self, source: str, key: str, problem: str) -> None:
         super().__init__(f"{source}: {key}: {problem}" if key else f"{source}: {problem}")
@@ -62,63 +78,74 @@ class EmulatorError(PlanarmError):
     """The emulator cannot start: a bad flash image, a link or a file that cannot be made."""
 
     exit_code: ClassVar[int] = 2
+    code: ClassVar[str] = "E203"
 
 
 class OutputError(PlanarmError):
     """A file or folder that was asked for cannot be written."""
 
     exit_code: ClassVar[int] = 2
+    code: ClassVar[str] = "E204"
 
 
 class PlanFileError(PlanarmError):
     """What was given as a plan is none, or cannot be read."""
 
     exit_code: ClassVar[int] = 2
+    code: ClassVar[str] = "E205"
 
 
 class CaptureError(PlanarmError):
     """A recording of the pins is damaged, cannot be read, or does not hold what is asked of it."""
 
     exit_code: ClassVar[int] = 2
+    code: ClassVar[str] = "E206"
 
 
 class NoPathError(PlanarmError):
     """No collision-free path joins start and goal on the given grid."""
 
     exit_code: ClassVar[int] = 3
+    code: ClassVar[str] = "E301"
 
 
 class TimingError(PlanarmError):
     """A path cannot be timed within the joints' speed and acceleration."""
 
     exit_code: ClassVar[int] = 4
+    code: ClassVar[str] = "E401"
 
 
 class CertificateError(PlanarmError):
     """A finished plan failed one of its checks, or carries no certificate."""
 
     exit_code: ClassVar[int] = 4
+    code: ClassVar[str] = "E402"
 
 
 class LinkError(PlanarmError):
     """The serial line or its protocol failed."""
 
     exit_code: ClassVar[int] = 5
+    code: ClassVar[str] = "E501"
 
 
 class HostKilledError(PlanarmError):
     """A schedule of faults killed the host: its program ends here, the board and the arm go on."""
 
     exit_code: ClassVar[int] = 5
+    code: ClassVar[str] = "E502"
 
 
 class DeviceFault(PlanarmError):  # noqa: N818 - the protocol's own word for it
     """The firmware latched a fault or refused a command."""
 
     exit_code: ClassVar[int] = 6
+    code: ClassVar[str] = "E601"
 
 
 class StepsDifferError(PlanarmError):
     """The executed steps are not the planned ones."""
 
     exit_code: ClassVar[int] = 7
+    code: ClassVar[str] = "E701"

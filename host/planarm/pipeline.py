@@ -6,8 +6,8 @@ scene -> FreeMap -> Path -> SmoothPath -> Trajectory -> StepTrain -> SegmentPlan
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator
-from contextlib import closing, contextmanager
+from collections.abc import Callable
+from contextlib import closing
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
@@ -28,13 +28,14 @@ from planarm.errors import (
 from planarm.fastest.task import fastest_path
 from planarm.link.arm_record import ArmSetup, ArmTrace
 from planarm.link.exchange import StreamResult, stream_plan
-from planarm.link.stream import StreamOptions
+from planarm.link.stream import StreamOptions, StreamProgress
 from planarm.link.transport import PinTrace, Transport, open_transport
 from planarm.model.arm import Arm
 from planarm.model.kinematics import forward
 from planarm.model.transmission import motor_axes
 from planarm.plan import Findings, Plan
 from planarm.plan_file import StoredPlan
+from planarm.record.outcome import Outcome, Seen, StreamLog
 from planarm.route import find_route
 from planarm.run_folder import begin_run_folder, finish_run_folder
 from planarm.scene import Scene
@@ -45,7 +46,7 @@ from planarm.stepping.schedule import schedule
 from planarm.stepping.segments import SegmentPlan, expand
 from planarm.stepping.slowing import SpeedLimit
 from planarm.stepping.windows import start_stop_ticks
-from planarm.summary import summarise
+from planarm.summary import planned_figures, seen_figures, summarise
 from planarm.trajectory.binding import report_timing
 from planarm.trajectory.limits import Limits
 from planarm.trajectory.motion import Trajectory
@@ -175,23 +176,30 @@ def run_scene(
 
     Raises:
         PlanarmError: the branch of the tree tells which stage failed. Differing steps are reported first, then raised.
-            When the stream failed, its notes tell what the emulated arm did.
+            When the stream failed, its notes tell what the emulated arm did, and the folder is complete all the same.
     """
     plan = plan_scene(scene, notice)
     begin_run_folder(out, stored(plan))
     setup = ArmSetup(scene, plan.segments.start_usteps, faults, fault_seed)
     with closing(open_transport(port, scene.link.baud, setup)) as transport:
+        log = StreamLog(transport.clock.now_s)
         intervals = tuple(start_stop_ticks(axis) for axis in motor_axes(scene.joints, scene.coupling))
-        with telling_of_the_arm(plan, transport):
-            streamed = stream(plan.segments, plan.certificate, transport, notice, intervals)
-        findings = judge_pins(plan.segments, transport.pins) if transport.pins else None
-        arm = judge_emulated_arm(plan, findings, transport.arm) if findings and transport.arm else None
-    summary = summarise(plan, streamed, findings, arm)
-    finish_run_folder(out, plan, summary, transport.pins, arm)
-    if findings and not findings.comparison.agrees:
-        raise StepsDifferError(f"{scene.source}: {findings.comparison.explain()}; see {out}")
-    if arm and not arm.clean:
-        raise StepsDifferError(f"{scene.source}: {arm.explain()}; see {out}")
+        try:
+            streamed = stream(plan.segments, plan.certificate, transport, notice, intervals, log.note)
+        except (LinkError, DeviceFault, HostKilledError, CertificateError, StepsDifferError) as error:
+            seen = look_at(plan, transport, SETTLE_AFTER_FAILURE_S)
+            for line in seen.notes() if log.samples else ():
+                error.add_note(line)
+            figures = {**planned_figures(plan), **seen_figures(seen.findings, seen.arm)}
+            finish_run_folder(out, Outcome(plan, figures, tuple(log.samples), seen, error.told()))
+            raise
+        seen = look_at(plan, transport, 0.0)
+    summary = summarise(plan, streamed, seen.findings, seen.arm)
+    finish_run_folder(out, Outcome(plan, summary, tuple(log.samples), seen))
+    if seen.findings and not seen.findings.comparison.agrees:
+        raise StepsDifferError(f"{scene.source}: {seen.findings.comparison.explain()}; see {out}")
+    if seen.arm and not seen.arm.clean:
+        raise StepsDifferError(f"{scene.source}: {seen.arm.explain()}; see {out}")
     return summary
 
 
@@ -201,10 +209,12 @@ def stream(
     transport: Transport,
     notice: Notice,
     intervals_ticks: tuple[int, ...] = (),
+    watch: Callable[[StreamProgress], None] | None = None,
 ) -> StreamResult:
     """Stream a certified plan and wait until the device has executed it.
 
     `intervals_ticks` are the motors' at their start-stop speeds; without them the device takes its default.
+    `watch` is told everything that the device tells.
 
     Raises:
         CertificateError: The certificate is red; nothing is sent.
@@ -217,7 +227,13 @@ def stream(
     # The need is not told: a fast arm's stop takes more road than the queue holds, and the device would run slowly.
     allowances = tuple(replace(allowance, need_ticks=0.0) for allowance in plan.allowances)
     options = StreamOptions(allowances=allowances, start_stop_ticks=intervals_ticks)
-    return stream_plan(transport, plan.segments, lambda told: notice("stream", told.path_s / told.total_s), options)
+
+    def tell(told: StreamProgress) -> None:
+        notice("stream", told.path_s / told.total_s)
+        if watch is not None:
+            watch(told)
+
+    return stream_plan(transport, plan.segments, tell, options)
 
 
 def judge_pins(plan: SegmentPlan, trace: PinTrace) -> Findings:
@@ -230,18 +246,16 @@ def judge_pins(plan: SegmentPlan, trace: PinTrace) -> Findings:
     return Findings(measured, compare_steps(planned, measured))
 
 
-@contextmanager
-def telling_of_the_arm(plan: Plan, transport: Transport) -> Iterator[None]:
-    """Add to an error of the stream what became of the emulated arm."""
-    try:
-        yield
-    except (LinkError, DeviceFault, HostKilledError) as error:
-        if transport.arm and transport.pins:
-            transport.arm.settle(SETTLE_AFTER_FAILURE_S)
-            arm = judge_emulated_arm(plan, judge_pins(plan.segments, transport.pins), transport.arm)
-            for line in (*arm.record.faults, f"the emulated arm: {arm.explain()}"):
-                error.add_note(line)
-        raise
+def look_at(plan: Plan, transport: Transport, settle_s: float) -> Seen:
+    """Hold pins and emulated arm against the plan, after a while in which the board executes what it has queued."""
+    if transport.pins is None:
+        return Seen()
+    if transport.arm:
+        transport.arm.settle(settle_s)
+    findings = judge_pins(plan.segments, transport.pins)
+    arm = judge_emulated_arm(plan, findings, transport.arm) if transport.arm else None
+    planned = [joint.ticks for joint in expand(plan.segments).steps]
+    return Seen(transport.pins, findings, arm, start_tick_of(planned, [joint.ticks for joint in findings.measured]))
 
 
 def judge_emulated_arm(plan: Plan, findings: Findings, trace: ArmTrace) -> ArmFindings:

@@ -1,4 +1,4 @@
-"""A run's folder: the plan, the trace, the summary and the pictures."""
+"""A run's folder: the plan, the trace, the summary, the record with its page, and the pictures."""
 
 from __future__ import annotations
 
@@ -9,19 +9,22 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from planarm.errors import UsageError
 from planarm.model.arm import Arm
 from planarm.model.kinematics import forward
 from planarm.model.shapes import shape_of
 from planarm.output import writing
 from planarm.plan_file import StoredPlan, save_plan
+from planarm.record.run_record import FORMAT, run_record
 from planarm.report import draw_joint_angles, draw_step_rates, draw_tip_error, draw_workspace
+from planarm.report.page import run_page
 from planarm_wire.messages import MIN_INTERVAL_TICKS, TICKS_HZ
 
 if TYPE_CHECKING:
-    from planarm.arm_findings import ArmFindings
-    from planarm.link.transport import PinTrace
     from planarm.plan import Plan
+    from planarm.record.outcome import Outcome
 
+SUMMARY, RECORD, PAGE = "summary.json", "record.json", "report.html"
 POSES_SHOWN = 7
 CURVE_POINTS = 600
 
@@ -37,28 +40,63 @@ def begin_run_folder(out: Path, stored: StoredPlan) -> None:
     save_plan(stored, out / "run.plan")
 
 
-def finish_run_folder(
-    out: Path, plan: Plan, summary: Mapping[str, Any], trace: PinTrace | None, arm: ArmFindings | None = None
-) -> None:
+def finish_run_folder(out: Path, outcome: Outcome) -> None:
     """Put everything else that a person or a program wants to keep of a run into the folder.
 
     Args:
         out: the folder, which `begin_run_folder` made.
-        plan: the plan with its stages.
-        summary: the run's figures.
-        trace: the emulated board's pins; None leaves out trace.vcd.
-        arm: what the emulated arm did; None leaves out tip_error.png.
+        outcome: the run. Without pins there is no trace.vcd, without an emulated arm no tip_error.png.
 
     Raises:
         OutputError: a file cannot be written.
     """
+    plan, seen = outcome.plan, outcome.seen
+    record = run_record(outcome)
     with writing(out):
-        (out / "summary.json").write_text(json.dumps(summary, indent=1) + "\n", encoding="utf-8")
+        (out / SUMMARY).write_text(json.dumps(_summary(outcome), indent=1) + "\n", encoding="utf-8")
+        (out / RECORD).write_text(json.dumps(record, separators=(",", ":")) + "\n", encoding="utf-8")
+        (out / PAGE).write_text(run_page(record), encoding="utf-8")
         _draw(plan, *(out / name for name in ("workspace.png", "joint_angles.png", "step_rates.png")))
-        if trace is not None:
-            trace.write_vcd(out / "trace.vcd")
-        if arm is not None:
-            draw_tip_error(out / "tip_error.png", arm.t_s, arm.tip_error_mm, title=plan.scene.name)
+        if seen.pins is not None:
+            seen.pins.write_vcd(out / "trace.vcd")
+        if seen.arm is not None:
+            draw_tip_error(out / "tip_error.png", seen.arm.t_s, seen.arm.tip_error_mm, title=plan.scene.name)
+
+
+def read_record(folder: Path) -> dict[str, Any]:
+    """Return the record of a run from its folder.
+
+    Raises:
+        UsageError: there is none, or none that this planarm reads.
+    """
+    path = folder / RECORD
+    try:
+        record = json.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise UsageError(
+            f"{path}: cannot be read: {error.strerror}; 'planarm run SCENE --out DIR' makes one"
+        ) from error
+    except ValueError as error:
+        raise UsageError(f"{path}: is no record of a run: {error}; run the scene anew") from error
+    if not isinstance(record, dict) or record.get("format") != FORMAT:
+        raise UsageError(f"{path}: is no record of format {FORMAT}; run the scene anew")
+    return record
+
+
+def write_page(record: Mapping[str, Any], page: Path) -> None:
+    """Write the page of a run.
+
+    Raises:
+        OutputError: it cannot be written.
+    """
+    with writing(page):
+        page.parent.mkdir(parents=True, exist_ok=True)
+        page.write_text(run_page(record), encoding="utf-8")
+
+
+def _summary(outcome: Outcome) -> dict[str, Any]:
+    """Return the figures, and the error of a run that failed."""
+    return {**outcome.summary, **({"error": dict(outcome.error)} if outcome.error else {})}
 
 
 def _draw(plan: Plan, workspace: Path, joint_angles: Path, step_rates: Path) -> None:

@@ -29,9 +29,22 @@ def summarise(
         findings: what the pins showed; None when they cannot be seen (a port that is not in this process).
         arm: what the emulated arm did; None when there is none.
     """
-    scene = plan.scene
     by_ledger_usteps = moved_usteps(streamed.ledger_before, streamed.ledger_after)
     net_usteps = by_ledger_usteps if findings is None else tuple(m.net_usteps for m in findings.measured)
+    return {
+        **planned_figures(plan),
+        "bytes_sent": streamed.bytes_sent,
+        "retransmissions": streamed.retransmissions,
+        "net_usteps_by_ledger": list(by_ledger_usteps),
+        "net_usteps": list(net_usteps),
+        **tip_figures(plan, net_usteps),
+        **seen_figures(findings, arm),
+    }
+
+
+def planned_figures(plan: Plan) -> dict[str, Any]:
+    """Return the figures that are known before anything moves."""
+    scene = plan.scene
     return {
         "scene": scene.name,
         "planner": scene.planner.algorithm,
@@ -47,15 +60,13 @@ def summarise(
         **plan.timing.figures(),
         "certificate_ok": plan.certificate.ok,
         "segments": len(plan.segments.segments),
-        "bytes_sent": streamed.bytes_sent,
-        "retransmissions": streamed.retransmissions,
         "steps_planned": [len(joint.ticks) for joint in plan.train.steps],
-        "net_usteps_by_ledger": list(by_ledger_usteps),
-        "net_usteps": list(net_usteps),
-        **tip_figures(plan, net_usteps),
-        **_pin_figures(findings),
-        **(arm.figures() if arm else {}),
     }
+
+
+def seen_figures(findings: Findings | None, arm: ArmFindings | None) -> dict[str, Any]:
+    """Return the figures that pins and emulated arm give, whether or not the motion came to its end."""
+    return {**_pin_figures(findings), **(arm.figures() if arm else {})}
 
 
 def tip_figures(plan: Plan, net_usteps: tuple[int, ...]) -> dict[str, float]:

@@ -50,3 +50,14 @@ def test_truth_nothing_and_inner_tables() -> None:
 
 def test_brackets_in_values_are_no_markup() -> None:
     assert printed({"port": "[red]COM3[/red]"}) == ["port [red]COM3[/red]"]
+
+
+def test_mappings_in_a_list_are_a_line_of_words_each() -> None:
+    held = [
+        {"joint": 1, "limit": "speed", "share_of_time": 0.61},
+        {"joint": 2, "limit": "torque", "share_of_time": 0.2},
+    ]
+    assert printed({"binding_limits": held}) == [
+        "binding limits joint 1, limit speed, share of time 0.61",
+        "joint 2, limit torque, share of time 0.2",
+    ]

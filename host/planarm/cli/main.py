@@ -94,19 +94,21 @@ def build_parser() -> argparse.ArgumentParser:
     _add_campaign(commands, "sweep", "plan or search many scenes and settings")
     _add_campaign(commands, "campaign", "run many emulated boards with faults")
     _add_report(commands)
+    _add_explain(commands)
+    _add_completion(commands)
     return parser
 
 
 def report_error(error: PlanarmError, as_json: bool) -> None:
     """Print the error where its reader looks: one JSON object on stdout, or a sentence on stderr."""
     if as_json:
-        told = {"kind": type(error).__name__, "message": str(error), "exit_code": error.exit_code}
-        notes = {"notes": list(error.__notes__)} if hasattr(error, "__notes__") else {}
-        print(json.dumps({"error": {**error.fields, **told, **notes}}))
+        print(json.dumps({"error": error.told()}))
     else:
         print(f"planarm: {error}", file=sys.stderr)
         for note in getattr(error, "__notes__", ()):
             print(f"  {note}", file=sys.stderr)
+        if error.code:
+            print(f"  'planarm explain {error.code}' tells more", file=sys.stderr)
         if error.advice:
             print("What would help:", *(f"  - {sentence}" for sentence in error.advice), sep="\n", file=sys.stderr)
 
@@ -128,7 +130,7 @@ def _add_run(commands: Commands) -> None:
     command = commands.add_parser("run", help="plan, stream, verify and report", epilog=EXIT_CODES)
     _add_scene(command)
     _add_port(command)
-    command.add_argument("--out", metavar="DIR", help="folder for plan, trace, summary and pictures")
+    command.add_argument("--out", metavar="DIR", help="folder for report.html, plan, trace, summary and pictures")
     command.add_argument("--faults", metavar="FILE", help="a schedule of what goes wrong around the emulated board")
     command.add_argument("--fault-seed", type=int, metavar="N", help="in place of the schedule's own seed")
     _add_json(command)
@@ -225,10 +227,30 @@ def _add_campaign(commands: Commands, name: str, purpose: str) -> None:
 
 
 def _add_report(commands: Commands) -> None:
-    command = commands.add_parser("report", help="tables and plots of a sweep's or campaign's results")
-    command.add_argument("results", metavar="DIR", help="the folder of the results")
-    command.add_argument("--out", metavar="DIR", help="folder for the plots")
+    command = commands.add_parser(
+        "report", help="the page of a run; tables and plots of a sweep's or campaign's results"
+    )
+    command.add_argument("results", metavar="DIR", help="the folder of the run or of the results")
+    command.add_argument("--out", metavar="DIR", help="folder for report.html (the run's own) or for the plots")
     _add_json(command)
+
+
+def _add_explain(commands: Commands) -> None:
+    command = commands.add_parser("explain", help="what an error's, check's or fault's code means, and what helps")
+    command.add_argument(
+        "code", metavar="CODE", nargs="?", help="such as E202, C12, F2 or R2; without it, all are listed"
+    )
+    _add_json(command)
+
+
+def _add_completion(commands: Commands) -> None:
+    command = commands.add_parser(
+        "completion",
+        help="print a completion script for a shell",
+        description='For bash: eval "$(planarm completion bash)". For zsh the same. For fish:\n'
+        "planarm completion fish | source",
+    )
+    command.add_argument("shell", choices=("bash", "zsh", "fish"))
 
 
 def _positive(text: str) -> float:

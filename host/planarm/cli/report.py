@@ -1,8 +1,9 @@
-"""`planarm report DIR`: what a sweep's or campaign's results say."""
+"""`planarm report DIR`: the page of a run, or what a sweep's or campaign's results say."""
 
 from __future__ import annotations
 
 import argparse
+import json
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -16,11 +17,29 @@ if TYPE_CHECKING:
 
 
 def execute(options: argparse.Namespace) -> int:
+    """Write a run's page anew, or print a campaign's tables; which of them the folder tells."""
+    from planarm.run_folder import RECORD
+
+    folder = Path(options.results)
+    return _run(folder, options) if (folder / RECORD).exists() else _campaign(folder, options)
+
+
+def _run(folder: Path, options: argparse.Namespace) -> int:
+    """Write the page of a run from its record, beside it or into --out."""
+    from planarm.run_folder import PAGE, read_record, write_page
+
+    record = read_record(folder)
+    page = Path(options.out or folder) / PAGE
+    write_page(record, page)
+    print(json.dumps({"report": str(page), "verdict": record["verdict"]}) if options.json else page)
+    return 0
+
+
+def _campaign(folder: Path, options: argparse.Namespace) -> int:
     """Print tables of groups and failures; with --out draw the distributions."""
     from planarm.campaign.store import read_about, read_rows
     from planarm.report.campaign import failures, figure_names, grouped, report_json
 
-    folder = Path(options.results)
     told = read_about(folder)
     table = read_rows(folder)
     if table is None:

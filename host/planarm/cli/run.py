@@ -55,4 +55,4 @@ def _print(summary: dict[str, object], out: Path) -> None:
 
     console = terminal()
     console.print(summary_table(summary))
-    console.print(f"plan, trace, summary and pictures: {out}", markup=False)  # brackets in names are names
+    console.print(f"report: {out / 'report.html'}; beside it plan, trace, summary and pictures", markup=False)

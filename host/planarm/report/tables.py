@@ -31,8 +31,9 @@ UNITS: Final = {
 def summary_table(summary: Mapping[str, Any], title: str | None = None) -> Table:
     """Return a two-column table of a summary: names in words, values with the units of their keys.
 
-    The unit is the key's last word, as in `path_length_cm`. Mappings inside are flattened, a list's entries stand on
-    one line with slashes between, None reads "not measured", and truth values "yes" or "no", the latter in red.
+    The unit is the key's last word, as in `path_length_cm`. Mappings inside are flattened. Entries of a list stand on
+    one line with slashes between, or on a line each where they are mappings. None reads "not measured", truth values
+    "yes" or "no", the latter in red.
     """
     from rich import box
     from rich.table import Table
@@ -94,8 +95,16 @@ def _text(value: Any, unit: str) -> str:  # noqa: ANN401 - a summary holds whate
         return "[dim]not measured[/dim]"
     if isinstance(value, bool):
         return "yes" if value else "[bold red]no[/bold red]"
-    text = " / ".join(map(_number, value)) if isinstance(value, (list, tuple)) else _number(value)
+    text = _list(value) if isinstance(value, (list, tuple)) else _number(value)
     return escape(f"{text} {unit}".strip() if text else "none")
+
+
+def _list(values: Sequence[Any]) -> str:
+    """Return numbers side by side, and mappings a line each, such as ``joint 1, limit speed, share of time 0.6``."""
+    if not any(isinstance(value, Mapping) for value in values):
+        return " / ".join(map(_number, values))
+    lines = [[f"{str(key).replace('_', ' ')} {_number(one)}" for key, one in value.items()] for value in values]
+    return "\n".join(", ".join(line) for line in lines)
 
 
 def _number(value: object) -> str:

@@ -1,0 +1,112 @@
+"""What is left of a run when it has ended, well or not: the stages' values, and what was seen while it streamed."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from itertools import accumulate
+from typing import TYPE_CHECKING, Any
+
+from planarm_wire.messages import TICKS_HZ
+from planarm_wire.steps import duration_ticks
+
+if TYPE_CHECKING:
+    from planarm.arm_findings import ArmFindings
+    from planarm.link.stream import StreamProgress
+    from planarm.link.transport import PinTrace
+    from planarm.plan import Findings, Plan
+
+
+@dataclass(frozen=True, slots=True)
+class StreamSample:
+    """What the device told at one moment.
+
+    Attributes:
+        at_s: the moment on the transport's clock.
+        path_s: path time of the segments executed.
+        executed_segments: their number.
+        queued_segments: segments sent and not yet executed.
+        state: what the device was doing, in the protocol's word.
+    """
+
+    at_s: float
+    path_s: float
+    executed_segments: int
+    queued_segments: int
+    state: str
+
+
+class StreamLog:
+    """Keeps what the device tells while a plan is streamed."""
+
+    def __init__(self, now_s: Callable[[], float]) -> None:
+        self.samples: list[StreamSample] = []
+        self._now_s = now_s
+
+    def note(self, told: StreamProgress) -> None:
+        """Keep one progress message, with the clock's time."""
+        self.samples.append(
+            StreamSample(
+                self._now_s(), told.path_s, told.executed_segments, told.queued_segments, told.state.name.lower()
+            )
+        )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Seen:
+    """What was seen of a run from outside the board.
+
+    Attributes:
+        pins: the pins; None when they cannot be seen, as on a real board.
+        findings: what they showed.
+        arm: what the emulated arm did; None when there is none.
+        start_tick: tick of the plan's zero on the board, by the first step at the pins; 0 when there is none.
+    """
+
+    pins: PinTrace | None = None
+    findings: Findings | None = None
+    arm: ArmFindings | None = None
+    start_tick: int = 0
+
+    def notes(self) -> list[str]:
+        """Say what became of the emulated arm, for an error of the stream."""
+        return [*self.arm.record.faults, f"the emulated arm: {self.arm.explain()}"] if self.arm else []
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Outcome:
+    """A run.
+
+    Attributes:
+        plan: what was planned.
+        summary: its figures.
+        samples: what the device told while it was streamed.
+        seen: what pins and arm showed.
+        error: why the run ended early, as the command line tells it; None when it did not.
+    """
+
+    plan: Plan
+    summary: Mapping[str, Any]
+    samples: tuple[StreamSample, ...] = ()
+    seen: Seen = Seen()
+    error: Mapping[str, Any] | None = None
+
+    @property
+    def start_s(self) -> float | None:
+        """The time of the plan's zero on the transport's clock; None when nothing was executed.
+
+        An emulator's clock is the board's. On a real port the zero is bracketed by what the device told: a status
+        comes some milliseconds after the segment's end that it tells, so the earliest is nearest.
+        """
+        if self.seen.start_tick:
+            return self.seen.start_tick / TICKS_HZ
+        return min((sample.at_s - sample.path_s for sample in self.samples if sample.executed_segments), default=None)
+
+    def buffered_s(self) -> list[float]:
+        """Return, for each sample, the path time of what the device had in its queue."""
+        ends = (0, *accumulate(duration_ticks(segment) for segment in self.plan.segments.segments))
+        last = len(ends) - 1
+        return [
+            (ends[min(s.executed_segments + s.queued_segments, last)] - ends[min(s.executed_segments, last)]) / TICKS_HZ
+            for s in self.samples
+        ]
