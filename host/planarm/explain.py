@@ -4,7 +4,7 @@
 ``E202``  an exception of `planarm.errors`; its first digit is the exit code
 ``C12``   a check of the certificate
 ``F2``    a fault that the device latched, by its number on the wire
-``R3``    a refusal of the device, by its number on the wire
+``R3``    a refusal of the device, by its number on the wire without the minus
 ========  ==========================================================================
 """
 
@@ -52,9 +52,9 @@ def explanations() -> dict[str, Explanation]:
         if fault is not Fault.NONE
     ]
     found += [
-        Explanation(f"R{result.value}", f"Refusal: {_word(result.name)}", _sentence(words[0]), _sentence(words[1]))
+        Explanation(f"R{-result.value}", f"Refusal: {_word(result.name)}", _sentence(words[0]), _sentence(words[1]))
         for result, words in RESULT_WORDS.items()
-        if result is not Result.OK
+        if result.value < Result.OK
     ]
     return {explanation.code: explanation for explanation in found}
 

@@ -40,7 +40,7 @@ def test_no_error_is_explained_that_does_not_exist():
 
 def test_every_fault_and_refusal_is_explained():
     wanted = {f"F{one.value}" for one in Fault if one is not Fault.NONE}
-    wanted |= {f"R{one.value}" for one in Result if one is not Result.OK}
+    wanted |= {f"R{-one.value}" for one in Result if one.value < 0}
     assert wanted <= set(explanations())
     assert "queue ran empty" in explain("underrun").cause
 
@@ -88,7 +88,9 @@ def test_every_check_of_a_plan_has_its_code_and_every_code_is_some_checks():
     assert unseen <= {"C25"}, "the scene has no floor"
 
 
-@pytest.mark.parametrize("asked", ["E202", "e202", "C12", "joint 2 step interval", "F2", "UNDERRUN", "BUSY"])
+@pytest.mark.parametrize(
+    "asked", ["E202", "e202", "C12", "joint 2 step interval", "F2", "UNDERRUN", "WRONG_STATE", "R3"]
+)
 def test_a_code_or_a_name_is_explained(capsys, asked):
     code, out, err = leave(capsys, "explain", asked)
     assert (code, err) == (0, "")
