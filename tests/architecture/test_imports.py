@@ -67,7 +67,12 @@ ALLOWED: dict[str, set[str]] = {
     "planarm.link": {"planarm.errors", "planarm.scene", "planarm.model", "planarm_wire", "planarm_sim"},
     "planarm.arm_findings": {"planarm.link", "planarm.model", "planarm.plan", "planarm_wire"},
     "planarm.analysis": {"planarm.errors", *WIRE},
-    "planarm.report": {"planarm.errors", "planarm.analysis", "planarm_wire"},  # analysis: the types of what it prints
+    "planarm.report": {
+        "planarm",
+        "planarm.errors",
+        "planarm.analysis",
+        "planarm_wire",
+    },  # analysis: the types of what it prints
     "planarm.plan": {
         "planarm.scene",
         "planarm.workspace",

@@ -212,6 +212,7 @@ def _add_timing(commands: Commands) -> None:
     )
     command.add_argument("--tolerance-us", type=_positive, default=1.0, metavar="US", help="off time beyond (1)")
     command.add_argument("--junit", metavar="FILE.xml", help="also write the verdict as JUnit XML")
+    command.add_argument("--html", metavar="FILE.html", help="also write a page for people")
     _add_json(command)
 
 

@@ -27,8 +27,8 @@ def execute(options: argparse.Namespace) -> int:
         raise UsageError("give one capture, or 'diff' and two captures; 'planarm timing --help' shows both")
     if is_diff and options.plan:
         raise UsageError("diff holds one capture against the other; --plan goes with one capture")
-    if options.junit:
-        require_place(Path(options.junit))
+    for place in filter(None, (options.junit, options.html)):
+        require_place(Path(place))
     request = TimingRequest(
         capture=names[-1],
         plan=Path(options.plan) if options.plan else None,
@@ -50,12 +50,17 @@ def execute(options: argparse.Namespace) -> int:
 
 def _tell(options: argparse.Namespace, found: TimingFindings) -> None:
     from planarm.cli.terminal import terminal
-    from planarm.report.timing import findings_table, joints_table, junit, timing_json, verdict
+    from planarm.report.page import timing_page
+    from planarm.report.timing import findings_table, joints_table, junit, timing_json, timing_record, verdict
 
     report = found.report
     if options.junit:
         with writing(Path(options.junit)):
             Path(options.junit).write_text(junit(report, found.tips_cm), encoding="utf-8")
+    if options.html:
+        with writing(Path(options.html)):
+            told = timing_record(report, found.drivers, found.tips_cm)
+            Path(options.html).write_text(timing_page(told), encoding="utf-8")
     if options.json:
         print(json.dumps(timing_json(report, found.drivers, found.tips_cm)))
         return

@@ -7,7 +7,10 @@ from __future__ import annotations
 import xml.etree.ElementTree as ET
 from collections.abc import Sequence
 from dataclasses import asdict
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
+
+import planarm
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -42,6 +45,23 @@ def timing_json(report: TimingReport, drivers: Sequence[str | None], tips_cm: Se
     for finding, tip in zip(told["findings"], tips_cm, strict=True):
         finding["tip_cm"] = tip
     return told
+
+
+def timing_record(
+    report: TimingReport, drivers: Sequence[str | None], tips_cm: Sequence[Point | None]
+) -> dict[str, Any]:
+    """Return what a page shows of a report: the whole of it, its verdict, and the words for its findings."""
+    told = timing_json(report, drivers, tips_cm)
+    state, word = ("green", "nothing is wrong") if report.ok else ("red", "something is wrong")
+    rows = [(name, cells) for name, cells in _rows(report.joints, drivers) if any(cells)]
+    return {
+        **told,
+        "planarm": planarm.__version__,
+        "title": Path(report.source).name,
+        "verdict": {"state": state, "word": word, "why": verdict(report)},
+        "words": WORDS,
+        "rows": rows,
+    }
 
 
 def joints_table(report: TimingReport, drivers: Sequence[str | None]) -> Table:

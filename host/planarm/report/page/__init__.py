@@ -14,6 +14,8 @@ from typing import Any, Final
 
 RUN_STYLES: Final = ("base.css", "run.css")
 RUN_CODE: Final = ("dom.js", "plot.js", "workspace.js", "player.js", "events.js", "tables.js", "run.js")
+TIMING_STYLES: Final = ("base.css", "timing.css")
+TIMING_CODE: Final = ("dom.js", "plot.js", "events.js", "timing.js")
 
 
 def run_page(record: Mapping[str, Any]) -> str:
@@ -23,6 +25,15 @@ def run_page(record: Mapping[str, Any]) -> str:
         record: what `planarm.record.run_record` returns, or read from a run's record.json.
     """
     return page(f"{record['title']} – planarm", record, RUN_STYLES, RUN_CODE)
+
+
+def timing_page(record: Mapping[str, Any]) -> str:
+    """Return the page of a timing report.
+
+    Args:
+        record: what `planarm.report.timing.timing_record` returns.
+    """
+    return page(f"{record['title']} – planarm timing", record, TIMING_STYLES, TIMING_CODE)
 
 
 def page(title: str, record: Mapping[str, Any], styles: Sequence[str], code: Sequence[str]) -> str:

@@ -9,14 +9,14 @@ const STAYS = new Set(["ready", "idle"]);
 const newsworthy = (event) => !(event.lane === "device" && STAYS.has(event.text));
 
 class Lanes {
-  constructor(events, axis, seek) {
+  constructor(events, axis, seek, lanes = LANES, title = "Events") {
     this.axis = axis;
     this.events = events;
-    this.shown = LANES.filter(([lane]) => events.some((event) => event.lane === lane));
+    this.shown = lanes.filter(([lane]) => events.some((event) => event.lane === lane));
     const bad = events.filter((event) => event.severity !== "info").length;
-    this.svg = s("svg", { class: "lanes", role: "img", "aria-label": `Events over time: ${events.length}, of which ${bad} are out of the ordinary; the list below has them` });
+    this.svg = s("svg", { class: "lanes", role: "img", "aria-label": `${title} over time: ${events.length}, of which ${bad} are out of the ordinary; the list below has them` });
     this.element = h("figure", { class: "strip" },
-      h("figcaption", {}, h("b", {}, "Events"), h("span", { class: "quiet" }, bad ? `${num(bad)} out of the ordinary` : "none out of the ordinary")), this.svg);
+      h("figcaption", {}, h("b", {}, title), h("span", { class: "quiet" }, bad ? `${num(bad)} out of the ordinary` : "none out of the ordinary")), this.svg);
     scrubbing(this.svg, axis, seek);
   }
 
