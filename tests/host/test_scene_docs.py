@@ -5,7 +5,7 @@ import tomllib
 from pathlib import Path
 
 import planarm
-from planarm.scene import limit_switches, load, parse_scene
+from planarm.scene import dc_motors, limit_switches, load, parse_scene, roadmap, task
 
 ROOT = Path(__file__).resolve().parents[2]
 TEXT = (ROOT / "docs" / "scene.md").read_text(encoding="utf-8")
@@ -14,7 +14,7 @@ TABLES = {
     "arm": load.ARM_KEYS,
     "workspace": load.WORKSPACE_KEYS,
     "obstacles": (*load.ROUND_KEYS, *load.POLYGON_KEYS),
-    "task": load.TASK_KEYS,
+    "task": task.TASK_KEYS,
     "planner": load.PLANNER_KEYS,
     "joints": load.JOINT_KEYS,
     "joints.motor": load.MOTOR_KEYS,
@@ -24,7 +24,12 @@ TABLES = {
     "motion": load.MOTION_KEYS,
     "joint_space": load.JOINT_SPACE_KEYS,
     "limit_switches": limit_switches.KEYS,
+    "roadmap": roadmap.ROADMAP_KEYS,
+    "dc_motors": dc_motors.DC_MOTOR_KEYS,
 }
+
+
+COUNTS = {**load.NEIGHBOURS, **load.ROADMAP_NEIGHBOURS}
 
 
 def test_every_table_lists_the_keys_that_are_read_and_no_others():
@@ -33,13 +38,13 @@ def test_every_table_lists_the_keys_that_are_read_and_no_others():
     assert set(found) == set(TABLES)
     for name, keys in TABLES.items():
         rows = [line.split("|")[1] for line in found[name].splitlines() if line.startswith("| `")]
-        listed = {key for row in rows for key in re.findall(r"`(\w+)`", row)} - set(load.NEIGHBOURS)
+        listed = {key for row in rows for key in re.findall(r"`(\w+)`", row)} - set(COUNTS)
         listed -= {"joints"} if name == "joints.motor" else set()
         assert listed == set(keys)
 
 
 def test_the_neighbourhoods_are_listed_with_the_default_first():
-    for algorithm, counts in load.NEIGHBOURS.items():
+    for algorithm, counts in COUNTS.items():
         row = re.search(rf"^\| `{algorithm}` \|(.*)\|$", TEXT, flags=re.M)
         assert row
         assert tuple(map(int, re.findall(r"\d+", row[1]))) == counts

@@ -4,12 +4,15 @@ This is the only place where units are converted: the file speaks centimetres an
 centimetres and radians. docs/scene.md is the reference of the format.
 """
 
+from planarm.scene.dc_motors import DcMotorSpec
 from planarm.scene.joint_space import ElbowChoice, JointObjective, JointSpaceSpec
 from planarm.scene.limit_switches import LimitSwitchSpec
 from planarm.scene.load import load_scene, parse_scene, with_planner, with_space
 from planarm.scene.mechanics import Matrix, MechanicsSpec
 from planarm.scene.motor import MotorSpec
+from planarm.scene.roadmap import EdgeCost, RoadmapSpec, Sampling
 from planarm.scene.types import (
+    ROADMAP_ALGORITHMS,
     Algorithm,
     ArmSpec,
     Corners,
@@ -31,9 +34,12 @@ from planarm.scene.types import (
 )
 
 __all__ = [
+    "ROADMAP_ALGORITHMS",
     "Algorithm",
     "ArmSpec",
     "Corners",
+    "DcMotorSpec",
+    "EdgeCost",
     "Elbow",
     "ElbowChoice",
     "JointObjective",
@@ -51,6 +57,8 @@ __all__ = [
     "PlannerSpec",
     "Point",
     "Range",
+    "RoadmapSpec",
+    "Sampling",
     "Scene",
     "Shape",
     "Subset",

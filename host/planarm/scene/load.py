@@ -6,15 +6,19 @@ from math import radians
 from pathlib import Path
 
 from planarm.errors import SceneError
+from planarm.scene.dc_motors import DC_MOTOR_KEYS, parse_dc_motors
 from planarm.scene.joint_space import JOINT_SPACE_KEYS, JointSpaceSpec, read_joint_space
 from planarm.scene.limit_switches import parse_limit_switches
 from planarm.scene.mechanics import MECHANICS_KEYS, TRANSMISSION_KEYS, parse_coupling, parse_mechanics
 from planarm.scene.motion import MOTION_KEYS, read_motion
 from planarm.scene.motor import KEYS as MOTOR_KEYS
 from planarm.scene.motor import parse_motor
+from planarm.scene.roadmap import ROADMAP_KEYS, parse_roadmap
 from planarm.scene.simple_polygon import polygon_problem
 from planarm.scene.strict_toml import Table
+from planarm.scene.task import TASK_KEYS, TaskLimits, parse_task
 from planarm.scene.types import (
+    ROADMAP_ALGORITHMS,
     Algorithm,
     ArmSpec,
     Elbow,
@@ -28,7 +32,6 @@ from planarm.scene.types import (
     Scene,
     Shape,
     Subset,
-    TaskSpec,
     WorkspaceSpec,
 )
 
@@ -46,12 +49,13 @@ ROOT_KEYS = (
     "motion",
     "joint_space",
     "limit_switches",
+    "roadmap",
+    "dc_motors",
 )
 ARM_KEYS = ("link_lengths_cm", "link_width_cm", "base_cm", "elbow", "joint_limits_deg", "floor")
 WORKSPACE_KEYS = ("x_cm", "y_cm", "cell_cm", "clearance_cm")
 ROUND_KEYS = ("shape", "center_cm", "diameter_cm")
 POLYGON_KEYS = ("shape", "vertices_cm")
-TASK_KEYS = ("start_cm", "goal_cm")
 PLANNER_KEYS = ("algorithm", "neighbours", "subset", "seed", "moves", "objective", "budget_s")
 JOINT_KEYS = (
     "steps_per_rev",
@@ -84,13 +88,15 @@ NEIGHBOURS: dict[Algorithm, tuple[int, ...]] = {
 }
 """The neighbourhoods that each algorithm knows (paper C, sections IV to VII); the first is the default."""
 
-LINKS = 2
-"""The links that planning and firmware serve."""
+ROADMAP_NEIGHBOURS: dict[Algorithm, tuple[int, ...]] = dict.fromkeys(ROADMAP_ALGORITHMS, (12, 6, 8, 16, 24, 32))
+"""How many nearest configurations each node of a roadmap is joined with; the first is the default."""
+
+MOST_LINKS = 8
 LARGEST_CM = 10_000.0
 SMALLEST_CELL_CM = 0.001
 MOST_GRID_NODES = 20_000_000
 JOINT_LIMITS_DEG: tuple[Range, ...] = ((-90.0, 270.0), (-180.0, 180.0))
-"""Without limits joint 1 may turn once round, from straight down to straight down."""
+"""Without limits joint 1 may turn once round, from straight down to straight down; the others as the second."""
 
 
 def load_scene(path: str | Path) -> Scene:
@@ -131,24 +137,37 @@ def scene_from_toml(data: dict[str, object], source: str) -> Scene:
     """
     root = Table.with_keys(source, "", data, ROOT_KEYS)
     workspace = _workspace(root.table("workspace", WORKSPACE_KEYS))
-    arm = _arm(root.table("arm", ARM_KEYS))
+    planner = _planner(root.table("planner", PLANNER_KEYS, optional=True))
+    arm = _arm(root.table("arm", ARM_KEYS), planner)
+    links = len(arm.link_lengths_cm)
+    limits = TaskLimits(
+        workspace.x_cm,
+        workspace.y_cm,
+        LARGEST_CM,
+        arm.link_lengths_cm,
+        arm.base_cm,
+        arm.joint_limits_rad,
+        planner.on_roadmap,
+    )
     return Scene(
         name=root.text("name", Path(source).stem or source),
         source=source,
         arm=arm,
         workspace=workspace,
         obstacles=tuple(_obstacle(source, path, entry) for path, entry in root.tables("obstacles")),
-        task=_task(root.table("task", TASK_KEYS), workspace),
-        planner=_planner(root.table("planner", PLANNER_KEYS, optional=True)),
-        joints=_joints(root),
+        task=parse_task(root.table("task", TASK_KEYS), limits),
+        planner=planner,
+        joints=_joints(root, links),
         link=_link(root.table("link", LINK_KEYS, optional=True)),
         mechanics=parse_mechanics(root.table("mechanics", MECHANICS_KEYS, optional=True), arm.link_lengths_cm),
-        coupling=parse_coupling(root.table("transmission", TRANSMISSION_KEYS, optional=True), LINKS),
+        coupling=parse_coupling(root.table("transmission", TRANSMISSION_KEYS, optional=True), links),
         joint_space=read_joint_space(root.table("joint_space", JOINT_SPACE_KEYS), arm.elbow)
         if "joint_space" in data
         else None,
         motion=read_motion(root.table("motion", MOTION_KEYS, optional=True)),
-        limit_switches=parse_limit_switches(root, LINKS),
+        limit_switches=parse_limit_switches(root, links),
+        roadmap=parse_roadmap(root.table("roadmap", ROADMAP_KEYS, optional=True)),
+        dc_motors=parse_dc_motors(root.table("dc_motors", DC_MOTOR_KEYS, optional=True), links),
     )
 
 
@@ -187,10 +206,13 @@ def with_space(scene: Scene, space: str | None) -> Scene:
     return scene
 
 
-def _arm(table: Table) -> ArmSpec:
+def _arm(table: Table, planner: PlannerSpec) -> ArmSpec:
     lengths = table.numbers("link_lengths_cm", above=0.0, at_most=LARGEST_CM)
-    if len(lengths) != LINKS:
-        table.reject("link_lengths_cm", list(lengths), f"{LINKS} lengths (arms with {LINKS} links are planned)")
+    if planner.on_roadmap and len(lengths) > MOST_LINKS:
+        table.reject("link_lengths_cm", list(lengths), f"1 to {MOST_LINKS} lengths")
+    if not planner.on_roadmap and len(lengths) != 2:
+        more = f"{', '.join(ROADMAP_ALGORITHMS)} plan 1 to {MOST_LINKS}"
+        table.reject("link_lengths_cm", list(lengths), f"2 lengths (planner.algorithm {planner.algorithm!r}; {more})")
     base, on_floor = table.point("base_cm", (0.0, 0.0), within=LARGEST_CM), table.flag("floor", False)
     if on_floor and base[1] < 0.0:
         table.reject("base_cm", list(base), "a base on or above y = 0, because arm.floor is true,")
@@ -199,22 +221,24 @@ def _arm(table: Table) -> ArmSpec:
         link_width_cm=table.number("link_width_cm", above=0.0, at_most=LARGEST_CM),
         base_cm=base,
         elbow=table.choice("elbow", ELBOWS),
-        joint_limits_rad=_joint_limits_rad(table),
+        joint_limits_rad=_joint_limits_rad(table, len(lengths)),
         floor=on_floor,
     )
 
 
-def _joint_limits_rad(table: Table) -> tuple[Range, ...]:
+def _joint_limits_rad(table: Table, joints: int) -> tuple[Range, ...]:
     key = "joint_limits_deg"
-    limits = table.ranges(key, JOINT_LIMITS_DEG, within=720.0)
-    if len(limits) != LINKS:
-        table.reject(key, [list(r) for r in limits], f"one [least, greatest] for each of the {LINKS} joints")
-    (low1, high1), (low2, high2) = limits
+    first, other = JOINT_LIMITS_DEG
+    limits = table.ranges(key, (first, *(other,) * (joints - 1)), within=720.0)
+    if len(limits) != joints:
+        table.reject(key, [list(r) for r in limits], f"one [least, greatest] for each of the {joints} joints")
+    low1, high1 = limits[0]
     if high1 - low1 > 360.0:
         problem = "a range of at most 360 degrees for joint 1 (a wider one gives a tip position several angles)"
         table.reject(key, [low1, high1], problem)
-    if low2 < -180.0 or high2 > 180.0:
-        table.reject(key, [low2, high2], "a range within [-180, 180] degrees for joint 2")
+    for joint, (low, high) in enumerate(limits[1:], 2):
+        if low < -180.0 or high > 180.0:
+            table.reject(key, [low, high], f"a range within [-180, 180] degrees for joint {joint}")
     return tuple((radians(low), radians(high)) for low, high in limits)
 
 
@@ -252,19 +276,10 @@ def _obstacle(source: str, path: str, data: object) -> Obstacle:
     )
 
 
-def _task(table: Table, workspace: WorkspaceSpec) -> TaskSpec:
-    for key in TASK_KEYS:
-        point = table.point(key, within=LARGEST_CM)
-        for axis, value, (low, high) in zip("xy", point, (workspace.x_cm, workspace.y_cm), strict=True):
-            if not low <= value <= high:
-                wanted = f"{axis} from {low:g} to {high:g} (workspace.{axis}_cm)"
-                table.reject(key, list(point), wanted)
-    return TaskSpec(table.point("start_cm", within=LARGEST_CM), table.point("goal_cm", within=LARGEST_CM))
-
-
 def _planner(table: Table) -> PlannerSpec:
-    algorithm = table.choice("algorithm", tuple(NEIGHBOURS), "taut")
-    known = NEIGHBOURS[algorithm]
+    counts = {**NEIGHBOURS, **ROADMAP_NEIGHBOURS}
+    algorithm = table.choice("algorithm", tuple(counts), "taut")
+    known = counts[algorithm]
     neighbours = table.integer("neighbours", known[0], at_least=1, at_most=1000)
     if neighbours not in known:
         table.reject("neighbours", neighbours, f"one of {', '.join(map(str, sorted(known)))} (algorithm {algorithm!r})")
@@ -279,11 +294,11 @@ def _planner(table: Table) -> PlannerSpec:
     )
 
 
-def _joints(root: Table) -> tuple[JointSpec, ...]:
+def _joints(root: Table, links: int) -> tuple[JointSpec, ...]:
     entries = root.tables("joints")
-    if len(entries) != LINKS:
+    if len(entries) != links:
         root.fail(
-            "joints", f"{len(entries)} given, {LINKS} expected: one [[joints]] table for each link, from the base"
+            "joints", f"{len(entries)} given, {links} expected: one [[joints]] table for each link, from the base"
         )
     return tuple(_joint(Table.with_keys(root.source, path, entry, JOINT_KEYS)) for path, entry in entries)
 

@@ -133,10 +133,5 @@ def _row(table: Table, key: str, row: object, joints: int, wanted: str) -> tuple
 def _each(
     table: Table, key: str, default: list[float], *, above: float | None = None, at_most: float = 1e4
 ) -> tuple[float, ...]:
-    """Return a list with one number a link."""
-    if key not in table.data:
-        return tuple(default)
-    numbers = table.numbers(key, above=above, at_least=None if above is not None else 0.0, at_most=at_most)
-    if len(numbers) != len(default):
-        table.reject(key, list(numbers), f"{len(default)} numbers, one for each link from the base,")
-    return numbers
+    """Return a list with one number a link, at least 0 unless another limit is given."""
+    return table.each(key, default, above=above, at_least=None if above is not None else 0.0, at_most=at_most)

@@ -24,11 +24,15 @@ UNITS = {
     "nm": "newton metres",
     "nm_s": "newton metres for 1 rad/s",
     "nm_rad": "newton metres for 1 rad",
+    "nm_a": "newton metres for 1 ampere",
+    "v_rad": "volts for 1 rad",
+    "v_s_rad": "volts for 1 rad/s",
     "a": "amperes",
     "v": "volts",
     "ohm": "ohms",
     "mh": "millihenries",
     "ms": "milliseconds",
+    "s": "seconds",
 }
 """The unit suffixes that keys of a scene end in."""
 
@@ -154,6 +158,23 @@ class Table:
         limits = _Limits(above, at_least, at_most)
         wanted = f"a list of numbers{limits.words}{_unit_words(key)}"
         return self._numbers(key, self._value(key, None, wanted), wanted, limits)
+
+    def each(
+        self,
+        key: str,
+        default: Sequence[float],
+        *,
+        above: float | None = None,
+        at_least: float | None = None,
+        at_most: float | None = None,
+    ) -> tuple[float, ...]:
+        """Return the list at `key` with one number a link or joint, as many as the default has."""
+        if key not in self.data:
+            return tuple(default)
+        numbers = self.numbers(key, above=above, at_least=at_least, at_most=at_most)
+        if len(numbers) != len(default):
+            self.reject(key, list(numbers), f"{len(default)} numbers, one for each link from the base,")
+        return numbers
 
     def point(self, key: str, default: tuple[float, float] | None = None, *, within: float) -> tuple[float, float]:
         """Return the pair of numbers at `key`, each from -within to within."""

@@ -4,23 +4,35 @@ from dataclasses import dataclass, field
 from math import ceil, floor, pi
 from typing import Literal
 
+from planarm.scene.dc_motors import DcMotorSpec
 from planarm.scene.joint_space import JointSpaceSpec
 from planarm.scene.limit_switches import LimitSwitchSpec
 from planarm.scene.mechanics import Matrix, MechanicsSpec
 from planarm.scene.motor import MotorSpec
+from planarm.scene.roadmap import RoadmapSpec
+from planarm.scene.task import Point, Range, TaskSpec
 
 Elbow = Literal["up", "down", "either"]
 Shape = Literal["circle", "square", "diamond", "triangle", "hexagon", "polygon"]
 Algorithm = Literal[
-    "a_star", "modified_a_star", "chaos_a_star", "chs", "taut", "theta_star", "lazy_theta_star", "any_angle"
+    "a_star",
+    "modified_a_star",
+    "chaos_a_star",
+    "chs",
+    "taut",
+    "theta_star",
+    "lazy_theta_star",
+    "any_angle",
+    "mpd_star_lite",
+    "d_star_lite",
+    "roadmap_a_star",
 ]
+ROADMAP_ALGORITHMS: tuple[Algorithm, ...] = ("mpd_star_lite", "d_star_lite", "roadmap_a_star")
+"""Those that search a graph of configurations (paper A), for any number of links."""
 Subset = Literal["run", "expansion"]
 Moves = Literal["proved", "cells", "nodes"]
 Corners = Literal["blend", "stop"]
 Objective = Literal["length", "time"]
-
-Point = tuple[float, float]
-Range = tuple[float, float]
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,14 +85,6 @@ class Obstacle:
 
 
 @dataclass(frozen=True, slots=True)
-class TaskSpec:
-    """Where the end effector starts and where it is to go."""
-
-    start_cm: Point
-    goal_cm: Point
-
-
-@dataclass(frozen=True, slots=True)
 class PlannerSpec:
     """The search: algorithm, neighbourhood, and how moves are checked.
 
@@ -96,6 +100,11 @@ class PlannerSpec:
     moves: Moves
     objective: Objective = "length"
     budget_s: float = 3.0
+
+    @property
+    def on_roadmap(self) -> bool:
+        """Whether a graph of configurations is searched."""
+        return self.algorithm in ROADMAP_ALGORITHMS
 
 
 @dataclass(frozen=True, slots=True)
@@ -163,6 +172,9 @@ class Scene:
     joint_space: JointSpaceSpec | None = None
     """How to plan in joint space; None plans in tip space."""
     limit_switches: tuple[LimitSwitchSpec, ...] = ()
+    roadmap: RoadmapSpec = field(default_factory=RoadmapSpec)
+    dc_motors: DcMotorSpec | None = None
+    """None stands for the usual ones (`DcMotorSpec.usual`)."""
 
     @property
     def margin_cm(self) -> float:
