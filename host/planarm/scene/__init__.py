@@ -11,6 +11,7 @@ from planarm.scene.load import load_scene, parse_scene, with_planner, with_space
 from planarm.scene.mechanics import Matrix, MechanicsSpec
 from planarm.scene.motor import MotorSpec
 from planarm.scene.roadmap import EdgeCost, RoadmapSpec, Sampling
+from planarm.scene.task import Point, Range, TaskSpec
 from planarm.scene.types import (
     ROADMAP_ALGORITHMS,
     Algorithm,
@@ -24,12 +25,9 @@ from planarm.scene.types import (
     Objective,
     Obstacle,
     PlannerSpec,
-    Point,
-    Range,
     Scene,
     Shape,
     Subset,
-    TaskSpec,
     WorkspaceSpec,
 )
 

@@ -16,7 +16,7 @@ from planarm.scene.motor import parse_motor
 from planarm.scene.roadmap import ROADMAP_KEYS, parse_roadmap
 from planarm.scene.simple_polygon import polygon_problem
 from planarm.scene.strict_toml import Table
-from planarm.scene.task import TASK_KEYS, TaskLimits, parse_task
+from planarm.scene.task import TASK_KEYS, Range, TaskLimits, parse_task
 from planarm.scene.types import (
     ROADMAP_ALGORITHMS,
     Algorithm,
@@ -28,7 +28,6 @@ from planarm.scene.types import (
     Objective,
     Obstacle,
     PlannerSpec,
-    Range,
     Scene,
     Shape,
     Subset,

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from itertools import combinations
 
-from planarm.scene.types import Point
+from planarm.scene.task import Point
 
 MOST_VERTICES = 1000
 

@@ -1,0 +1,192 @@
+"""Planning on a graph that changes while the start moves: A*, D* Lite and MPD* Lite behind one contract.
+
+`solve` gives the best path for what is known; `change` tells new costs, `move_start` where the start is now; the next
+`solve` goes on from there. Costs that are not known are asked for, node by node, and kept.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Literal, NamedTuple
+
+import numpy as np
+
+from planarm.search.digraph import Bounds, Digraph, Floats, Ints
+from planarm.search.lifelong import (
+    COUNTERS,
+    DONE,
+    EXPANDED,
+    GOAL,
+    LOOKED,
+    RESCANNED,
+    START,
+    UPDATED,
+    best_first,
+    change,
+    concerned,
+    gradient_path,
+    new_lifelong,
+    repair,
+    stored_path,
+)
+from planarm.search.result import SearchStatus
+
+GraphAlgorithm = Literal["mpd_star_lite", "d_star_lite", "roadmap_a_star"]
+
+Costing = Callable[[int], None]
+"""Told a node; fills in the costs of all edges into it that are not known."""
+
+REPAIR_SHARE = 0.5
+"""A change is repaired when it concerns fewer nodes than this share of what a search anew expanded last.
+
+A node concerned is expanded about twice, once to forget and once to learn its distance."""
+
+
+NOWHERE = -1
+"""A start that is never reached, so that all distances are found."""
+
+
+class Changes(NamedTuple):
+    """New costs of edges, both of shape (k,)."""
+
+    edges: Ints
+    costs: Floats
+
+
+@dataclass(frozen=True, slots=True)
+class Work:
+    """What one `solve` did."""
+
+    expanded: int
+    updated: int
+    looked: int
+    """Edges looked at while searching."""
+    rescanned: int
+    """Nodes all of whose successors were compared."""
+    read_off: int
+    """Edges (D* Lite) or nodes (MPD* Lite, A*) looked at to tell the path."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class GraphAnswer:
+    """The answer of one `solve`."""
+
+    status: SearchStatus
+    nodes: Ints
+    """From start to goal; empty when there is no path."""
+    cost: float
+    work: Work
+    anew: bool
+    """True when the search began from nothing."""
+
+
+class GraphPlanner:
+    """One of the three algorithms on a graph; the state that it keeps between two calls."""
+
+    def __init__(
+        self,
+        graph: Digraph,
+        bounds: Bounds,
+        ends: tuple[int, int],
+        algorithm: GraphAlgorithm,
+        costing: Costing | None = None,
+        *,
+        always_repair: bool = False,
+    ) -> None:
+        """Prepare; nothing is searched yet.
+
+        Args:
+            graph: its costs are changed by `change` and by `costing` only.
+            bounds: lower bounds of distances, consistent whatever the costs become.
+            ends: start and goal.
+            algorithm: A* searches anew each time.
+            costing: needed when costs are not known.
+            always_repair: MPD* Lite then never starts anew, even where that is cheaper.
+        """
+        self._graph, self._bounds, self._algorithm, self._costing = graph, bounds, algorithm, costing
+        self._always_repair = always_repair
+        self._last_anew = 0
+        self._fresh = True
+        self._start_over(*ends)
+
+    @property
+    def start(self) -> int:
+        """The node at which paths begin."""
+        return int(self._state.ends[START])
+
+    def solve(self) -> GraphAnswer:
+        """Return the best path from the start as it is now."""
+        if self._algorithm == "roadmap_a_star":
+            self._start_over(self.start, int(self._state.ends[GOAL]))
+        anew, before = self._fresh, self._state.counted.copy()
+        search = best_first if self._algorithm == "roadmap_a_star" else repair
+        while (needing := search(self._graph, self._bounds, self._state)) != DONE:
+            if self._costing is None:
+                raise ValueError(f"the cost of an edge into node {needing} is not known, and nothing tells it")
+            self._costing(needing)
+        self._fresh = False
+        counted = self._state.counted - before
+        if anew:
+            self._last_anew = int(counted[EXPANDED])
+        return self._answer(counted, anew)
+
+    def change(self, changes: Changes) -> None:
+        """Tell new costs of edges, known ones; MPD* Lite starts anew where that is cheaper than a repair."""
+        worth = self._always_repair or self._fresh or self._algorithm == "roadmap_a_star" or self._is_cheap(changes)
+        if self._algorithm == "roadmap_a_star" or not worth:
+            self._graph.cost[changes.edges] = changes.costs
+            self._start_over(self.start, int(self._state.ends[GOAL]))
+        else:
+            change(self._graph, self._bounds, self._state, changes.edges, changes.costs)
+
+    def move_start(self, node: int) -> None:
+        """Tell that paths begin at another node from now on."""
+        self._state.ends[START] = node
+
+    def _is_cheap(self, changes: Changes) -> bool:
+        """Whether the change is worth a repair; D* Lite, which stores no successors, cannot tell and repairs."""
+        if not self._state.stores:
+            return True
+        nodes, on_path = concerned(self._graph, self._state, changes.edges, changes.costs)
+        return not on_path or nodes < REPAIR_SHARE * self._last_anew
+
+    def _start_over(self, start: int, goal: int) -> None:
+        stores = self._algorithm != "d_star_lite"
+        self._state = new_lifelong(self._graph.nodes, start, goal, stores=stores)
+        self._fresh = True
+
+    def _answer(self, counted: Ints, anew: bool) -> GraphAnswer:
+        assert len(counted) == COUNTERS
+        cost = float(self._state.rhs[self.start])
+        if cost == np.inf:
+            nodes, read_off = np.empty(0, np.int64), 0
+        elif self._state.stores:
+            nodes, read_off = stored_path(self._state)
+        else:
+            nodes, read_off = gradient_path(self._graph, self._state)
+        expanded, updated, looked, rescanned = (int(counted[k]) for k in (EXPANDED, UPDATED, LOOKED, RESCANNED))
+        status = SearchStatus.FOUND if len(nodes) else SearchStatus.NO_PATH
+        return GraphAnswer(status, nodes, cost, Work(expanded, updated, looked, rescanned, read_off), anew)
+
+
+def landmarks(graph: Digraph, nodes: Ints) -> Floats:
+    """Return potentials from and to each of the nodes given, shape (2 k, n), for `Bounds`; all costs must be known.
+
+    The distance from s to u is at least d(L, u) - d(L, s) and d(s, L) - d(u, L); a node that is not reached keeps the
+    largest distance that is, which leaves the bound consistent. They hold while no cost falls below what it is now.
+    """
+    tables = []
+    for node in nodes:
+        for forwards in (True, False):
+            away = _all_distances(graph, int(node), forwards)
+            away[~np.isfinite(away)] = np.nanmax(np.where(np.isfinite(away), away, 0.0))
+            tables.append(away if forwards else -away)
+    return np.array(tables).reshape(-1, graph.nodes)
+
+
+def _all_distances(graph: Digraph, node: int, forwards: bool) -> Floats:
+    """Return every node's distance from a node, or to it, shape (n,); infinite where there is no way."""
+    turned = Digraph(graph.head, graph.tail, graph.in_first, graph.in_edge, graph.out_first, graph.out_edge, graph.cost)
+    state = new_lifelong(graph.nodes, NOWHERE, node, stores=True)
+    if best_first(turned if forwards else graph, Bounds.none(graph.nodes), state) != DONE:
+        raise ValueError("landmarks need the costs of all edges")
+    return state.g

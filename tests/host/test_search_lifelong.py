@@ -1,0 +1,293 @@
+"""A*, D* Lite and MPD* Lite against a plain Dijkstra after every change of random graphs, and on walks over grids."""
+
+import heapq
+import math
+import random
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from planarm.search.digraph import BELOW_ONE, Bounds, bound, digraph
+from planarm.search.incremental import Changes, GraphPlanner, landmarks
+from planarm.search.indexed_heap import new_heap, put, take_out
+from planarm.search.lifelong import DONE, change, gradient_path, new_lifelong, repair, stored_path
+from planarm.search.result import SearchStatus
+
+ALGORITHMS = ("roadmap_a_star", "d_star_lite", "mpd_star_lite")
+
+
+def dijkstra(graph, goal):
+    """Every node's distance to the goal."""
+    into = {}
+    for tail, head, cost in zip(graph.tail.tolist(), graph.head.tolist(), graph.cost.tolist(), strict=True):
+        into.setdefault(head, []).append((tail, cost))
+    distance, waiting = {}, [(0.0, goal)]
+    while waiting:
+        value, node = heapq.heappop(waiting)
+        if node not in distance:
+            distance[node] = value
+            for tail, cost in into.get(node, ()):
+                if cost < math.inf:
+                    heapq.heappush(waiting, (value + cost, tail))
+    return distance
+
+
+def path_cost(graph, nodes):
+    """What a path costs; the cheapest of parallel edges."""
+    total = 0.0
+    for a, b in pairwise(nodes):
+        total += min(graph.cost[e] for e in range(len(graph.cost)) if graph.tail[e] == a and graph.head[e] == b)
+    return total
+
+
+class RandomGraph:
+    """A random directed graph, costs never below a floor, so that landmarks of the floor stay valid."""
+
+    def __init__(self, rng, *, parallel=True):
+        self.rng = rng
+        self.count = rng.randrange(4, 40)
+        wanted = self.count * rng.choice([2, 3, 5])
+        ends = [(rng.randrange(self.count), rng.randrange(self.count)) for _ in range(wanted)]
+        if not parallel:
+            ends = sorted(set(ends))
+        self.tail, self.head = np.array(ends).T
+        self.floor = np.array([float(rng.choice([0.5, 1, 1, 2, 3.7, 8])) for _ in ends])
+        self.goal = rng.randrange(self.count)
+
+    def cost(self, edge):
+        rng = self.rng
+        return math.inf if rng.random() < 0.15 else float(self.floor[edge]) * rng.choice([1.0, 1.0, 1.5, 3.0])
+
+    def graph(self):
+        return digraph(self.count, self.tail, self.head, [self.cost(e) for e in range(len(self.tail))])
+
+    def edit(self):
+        """Edges raised and lowered, or a node removed."""
+        rng = self.rng
+        if rng.random() < 0.25:
+            node = rng.randrange(self.count)
+            edges = np.flatnonzero((self.tail == node) | (self.head == node))
+            return Changes(edges, np.full(len(edges), np.inf))
+        edges = np.array(rng.sample(range(len(self.tail)), rng.randrange(1, 5)))
+        return Changes(edges, np.array([self.cost(e) for e in edges]))
+
+    def bounds(self):
+        if self.rng.random() < 0.3:
+            return Bounds.none(self.count)
+        base = digraph(self.count, self.tail, self.head, self.floor)
+        return Bounds(landmarks(base, np.array([0, self.count - 1])), np.empty((self.count, 0)))
+
+
+def test_all_equal_dijkstra_after_every_change_of_random_graphs(sized):
+    """Edges raised, lowered and closed, nodes removed, the start moved along its path or anywhere."""
+    answers = 0
+    for seed in range(sized(40, 2000)):
+        rng = random.Random(seed)
+        made = RandomGraph(rng)
+        graphs = [made.graph()]
+        graphs += [graphs[0]._replace(cost=graphs[0].cost.copy()) for _ in range(3)]
+        bounds, start = made.bounds(), rng.randrange(made.count)
+        names = (*ALGORITHMS, "mpd_star_lite")
+        planners = [
+            GraphPlanner(graph, bounds, (start, made.goal), name, always_repair=k < 3)
+            for k, (graph, name) in enumerate(zip(graphs, names, strict=True))
+        ]
+        for _ in range(8):
+            wanted = dijkstra(graphs[0], made.goal).get(start, math.inf)
+            found = [planner.solve() for planner in planners]
+            for name, graph, answer in zip(names, graphs, found, strict=True):
+                assert answer.cost == pytest.approx(wanted, rel=1e-9), (seed, name)
+                if wanted == math.inf:
+                    assert answer.status is SearchStatus.NO_PATH
+                else:
+                    assert (answer.nodes[0], answer.nodes[-1]) == (start, made.goal), (seed, name)
+                    assert path_cost(graph, answer.nodes.tolist()) == pytest.approx(wanted, rel=1e-9), (seed, name)
+            answers += 1
+            if rng.random() < 0.6 and len(found[-1].nodes) > 1:
+                start = int(found[-1].nodes[rng.randrange(len(found[-1].nodes))])
+            elif rng.random() < 0.3:
+                start = rng.randrange(made.count)
+            edited = made.edit()
+            for planner in planners:
+                planner.move_start(start)
+                planner.change(edited)
+    assert answers == sized(40, 2000) * 8
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_the_stored_path_is_the_one_that_the_gradient_gives(seed):
+    """And is read off with one look a node, where the gradient takes one for each of their successors."""
+    rng = random.Random(seed)
+    made = RandomGraph(rng, parallel=False)
+    graph, start = made.graph(), rng.randrange(made.count)
+    state = new_lifelong(made.count, start, made.goal, stores=True)
+    bounds = made.bounds()
+    for _ in range(6):
+        assert repair(graph, bounds, state) == DONE
+        if state.rhs[start] < math.inf:
+            stored, looks = stored_path(state)
+            steep, edges = gradient_path(graph, state)
+            assert path_cost(graph, stored.tolist()) == pytest.approx(path_cost(graph, steep.tolist()), rel=1e-12)
+            assert looks == len(stored)
+            assert edges == sum(graph.out_first[u + 1] - graph.out_first[u] for u in steep[:-1])
+        edited = made.edit()
+        change(graph, bounds, state, edited.edges, edited.costs)
+
+
+class Walk:
+    """A robot on a grid that sees only its eight neighbours' cells, and learns of obstacles on its way."""
+
+    def __init__(self, seed, size=16, share=0.3):
+        rng = random.Random(seed)
+        self.size = size
+        self.blocked = np.array([rng.random() < share for _ in range(size * size)])
+        self.blocked[[0, size * size - 1]] = False
+        cells = [(x, y) for y in range(size) for x in range(size)]
+        ends = [
+            (y * size + x, (y + j) * size + x + i)
+            for x, y in cells
+            for i in (-1, 0, 1)
+            for j in (-1, 0, 1)
+            if (i or j) and 0 <= x + i < size and 0 <= y + j < size
+        ]
+        self.tail, self.head = np.array(ends).T
+        length = np.hypot(self.tail % size - self.head % size, self.tail // size - self.head // size)
+        self.graph = digraph(size * size, self.tail, self.head, length)
+        self.bounds = Bounds(np.empty((0, size * size)), np.array(cells, np.float64))
+
+    def seen(self, node):
+        x, y = node % self.size, node // self.size
+        near = (abs(self.head % self.size - x) <= 1) & (abs(self.head // self.size - y) <= 1)
+        return np.flatnonzero(near & self.blocked[self.head] & (self.graph.cost < np.inf))
+
+    def run(self, *, stores, keep_modifier):
+        """Walk until the goal is reached or known to be out of reach; return replans and wrong distances."""
+        goal = self.size**2 - 1
+        state = new_lifelong(self.size**2, 0, goal, stores=stores)
+        at, replans, wrong = 0, 0, 0
+        for _ in range(6 * self.size**2):
+            if at == goal:
+                break
+            edges = self.seen(at)
+            state.ends[0] = at
+            change(self.graph, self.bounds, state, edges, np.full(len(edges), np.inf))
+            if not keep_modifier:
+                state.key_modifier[0] = 0.0
+            repair(self.graph, self.bounds, state)
+            replans += 1
+            wanted = dijkstra(self.graph, goal).get(at, math.inf)
+            wrong += not math.isclose(min(state.rhs[at], 1e9), min(wanted, 1e9), rel_tol=1e-9)
+            path, _ = stored_path(state) if stores else gradient_path(self.graph, state)
+            if len(path) < 2:
+                break
+            at = int(path[1])
+        return replans, wrong
+
+
+@pytest.mark.parametrize("stores", [True, False])
+def test_walks_need_the_key_modifier_that_the_paper_leaves_out(stores, sized):
+    """Paper A's Table 3 has no k_m: the same walks, the same code, k_m put back to 0."""
+    right = [Walk(seed).run(stores=stores, keep_modifier=True) for seed in range(sized(6, 200))]
+    assert sum(wrong for _, wrong in right) == 0
+    printed = [Walk(seed).run(stores=stores, keep_modifier=False) for seed in range(sized(30, 200))]
+    assert sum(wrong for _, wrong in printed) > 0
+
+
+def test_costs_are_asked_for_only_where_the_search_comes():
+    rng = random.Random(3)
+    size = 20
+    walk = Walk(3, size)
+    known = walk.graph.cost.copy()
+    walk.graph.cost[:] = np.nan
+    asked = []
+
+    def costing(node):
+        asked.append(node)
+        for k in range(walk.graph.in_first[node], walk.graph.in_first[node + 1]):
+            edge = walk.graph.in_edge[k]
+            if np.isnan(walk.graph.cost[edge]):
+                walk.graph.cost[edge] = known[edge]
+
+    start, goal = 8 * size + 8, 8 * size + 12
+    planner = GraphPlanner(walk.graph, walk.bounds, (start, goal), "mpd_star_lite", costing)
+    assert planner.solve().cost == pytest.approx(4.0)
+    assert 0 < len(set(asked)) < 60
+    assert np.isnan(walk.graph.cost).any()
+    for _ in range(10):
+        edges = np.array(rng.sample(range(len(known)), 40))
+        known[edges] = np.inf
+        planner.change(Changes(edges, known[edges]))
+        whole = walk.graph._replace(cost=known)
+        assert planner.solve().cost == pytest.approx(dijkstra(whole, goal).get(start, math.inf))
+
+
+def test_a_repair_far_from_the_goal_is_cheap_and_one_at_the_goal_is_not_attempted():
+    """The tool takes the cheaper one: next to the goal nearly every stored way leads through the closed edges."""
+    size = 40
+    for near, anew in (("start", False), ("goal", True)):
+        walk = Walk(1, size, share=0.0)
+        planner = GraphPlanner(walk.graph, Bounds.none(size * size), (0, size * size - 1), "mpd_star_lite")
+        first = planner.solve()
+        node, goal = first.nodes[1], size * size - 1
+        at_start = (walk.graph.head == node) | (walk.graph.tail == node)
+        at_goal = (walk.graph.head == goal) & (walk.graph.tail != goal - 1)  # one of three ways in stays open
+        edges = np.flatnonzero(at_start if near == "start" else at_goal)
+        planner.change(Changes(edges, np.full(len(edges), np.inf)))
+        again = planner.solve()
+        assert again.anew is anew
+        assert again.cost == pytest.approx(dijkstra(walk.graph, size * size - 1)[0])
+        if not anew:
+            assert again.work.expanded < 0.2 * first.work.expanded
+
+
+def test_bounds_never_exceed_distances_and_fall_short_of_them_by_no_edge_s_worth():
+    rng = random.Random(9)
+    for _ in range(30):
+        made = RandomGraph(rng)
+        graph, bounds = made.graph(), made.bounds()
+        for node in range(made.count):
+            distance = dijkstra(graph, node)
+            for start in range(made.count):
+                assert bound(bounds, start, node) <= distance.get(start, math.inf)
+        landmark = Bounds(landmarks(graph, np.array([made.goal])), np.empty((made.count, 0)))
+        for start, value in dijkstra(graph, made.goal).items():
+            assert bound(landmark, start, made.goal) == pytest.approx(BELOW_ONE * value)
+
+
+def test_the_heap_is_a_sorted_list():
+    rng = random.Random(4)
+    heap, plain = new_heap(50), {}
+    for _ in range(3000):
+        node = rng.randrange(50)
+        if rng.random() < 0.3:
+            take_out(heap, node)
+            plain.pop(node, None)
+        else:
+            key = (float(rng.randrange(8)), float(rng.randrange(8)))
+            put(heap, node, *key)
+            plain[node] = key
+        assert heap.size[0] == len(plain)
+        if plain:
+            top = int(heap.nodes[0])
+            assert plain[top] == min(plain.values())
+        assert {int(n) for n in heap.nodes[: heap.size[0]]} == set(plain)
+
+
+def test_an_unreachable_start_has_no_path_and_no_cost():
+    for algorithm in ALGORITHMS:
+        graph = digraph(3, [0, 1], [1, 2], [1.0, np.inf])
+        planner = GraphPlanner(graph, Bounds.none(3), (0, 2), algorithm)
+        answer = planner.solve()
+        assert (answer.status, answer.cost, len(answer.nodes)) == (SearchStatus.NO_PATH, math.inf, 0)
+        planner.change(Changes(np.array([1]), np.array([2.0])))
+        assert planner.solve().cost == 3.0
+
+
+@pytest.mark.parametrize(
+    ("tail", "head", "cost", "words"),
+    [([0], [3], [1.0], "name nodes 0 to 3"), ([0], [1], [-1.0], "at least 0"), ([0], [1], [], "have the shapes")],
+)
+def test_what_is_no_graph_is_refused(tail, head, cost, words):
+    with pytest.raises(ValueError, match=words):
+        digraph(3, tail, head, cost)
