@@ -38,6 +38,16 @@ ALLOWED: dict[str, set[str]] = {
         "planarm_wire.kernel_cache",
     },
     "planarm.dynamics": {"planarm.scene", "planarm_wire.kernel_cache"},
+    # docs/decisions/0077: configurations and moves between them, searched by planarm.search, costed by planarm.dynamics
+    "planarm.roadmap": {
+        "planarm.errors",
+        "planarm.scene",
+        "planarm.model",
+        "planarm.workspace",
+        "planarm.search",
+        "planarm.dynamics",
+        "planarm_wire.kernel_cache",
+    },
     "planarm.trajectory": {
         "planarm.errors",
         "planarm.dynamics",

@@ -1,0 +1,1 @@
+"""Graphs of configurations (paper A's occupancy analysis): nodes, checked moves, what an obstacle touches, costs."""
