@@ -5,7 +5,7 @@ import tomllib
 from pathlib import Path
 
 import planarm
-from planarm.scene import dc_motors, limit_switches, load, parse_scene, roadmap, task
+from planarm.scene import dc_motors, limit_switches, load, moving, parse_scene, roadmap, task
 
 ROOT = Path(__file__).resolve().parents[2]
 TEXT = (ROOT / "docs" / "scene.md").read_text(encoding="utf-8")
@@ -15,6 +15,7 @@ TABLES = {
     "workspace": load.WORKSPACE_KEYS,
     "obstacles": (*load.ROUND_KEYS, *load.POLYGON_KEYS),
     "task": task.TASK_KEYS,
+    "obstacles.motion": moving.OBSTACLE_MOTION_KEYS,
     "planner": load.PLANNER_KEYS,
     "joints": load.JOINT_KEYS,
     "joints.motor": load.MOTOR_KEYS,
@@ -26,6 +27,7 @@ TABLES = {
     "limit_switches": limit_switches.KEYS,
     "roadmap": roadmap.ROADMAP_KEYS,
     "dc_motors": dc_motors.DC_MOTOR_KEYS,
+    "moving": moving.MOVING_KEYS,
 }
 
 

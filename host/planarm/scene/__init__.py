@@ -10,6 +10,7 @@ from planarm.scene.limit_switches import LimitSwitchSpec
 from planarm.scene.load import load_scene, parse_scene, with_planner, with_space
 from planarm.scene.mechanics import Matrix, MechanicsSpec
 from planarm.scene.motor import MotorSpec
+from planarm.scene.moving import MovingSpec, ObstacleMotion
 from planarm.scene.roadmap import EdgeCost, RoadmapSpec, Sampling
 from planarm.scene.task import Point, Range, TaskSpec
 from planarm.scene.types import (
@@ -50,8 +51,10 @@ __all__ = [
     "MotionSpec",
     "MotorSpec",
     "Moves",
+    "MovingSpec",
     "Objective",
     "Obstacle",
+    "ObstacleMotion",
     "PlannerSpec",
     "Point",
     "Range",

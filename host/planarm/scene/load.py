@@ -13,6 +13,7 @@ from planarm.scene.mechanics import MECHANICS_KEYS, TRANSMISSION_KEYS, parse_cou
 from planarm.scene.motion import MOTION_KEYS, read_motion
 from planarm.scene.motor import KEYS as MOTOR_KEYS
 from planarm.scene.motor import parse_motor
+from planarm.scene.moving import MovingSpec, read_moving, read_obstacle_motion
 from planarm.scene.roadmap import ROADMAP_KEYS, parse_roadmap
 from planarm.scene.simple_polygon import polygon_problem
 from planarm.scene.strict_toml import Table
@@ -50,11 +51,12 @@ ROOT_KEYS = (
     "limit_switches",
     "roadmap",
     "dc_motors",
+    "moving",
 )
 ARM_KEYS = ("link_lengths_cm", "link_width_cm", "base_cm", "elbow", "joint_limits_deg", "floor")
 WORKSPACE_KEYS = ("x_cm", "y_cm", "cell_cm", "clearance_cm")
-ROUND_KEYS = ("shape", "center_cm", "diameter_cm")
-POLYGON_KEYS = ("shape", "vertices_cm")
+ROUND_KEYS = ("shape", "center_cm", "diameter_cm", "motion")
+POLYGON_KEYS = ("shape", "vertices_cm", "motion")
 PLANNER_KEYS = ("algorithm", "neighbours", "subset", "seed", "moves", "objective", "budget_s")
 JOINT_KEYS = (
     "steps_per_rev",
@@ -148,12 +150,13 @@ def scene_from_toml(data: dict[str, object], source: str) -> Scene:
         arm.joint_limits_rad,
         planner.on_roadmap,
     )
+    moving = read_moving(root, planner.on_roadmap)
     return Scene(
         name=root.text("name", Path(source).stem or source),
         source=source,
         arm=arm,
         workspace=workspace,
-        obstacles=tuple(_obstacle(source, path, entry) for path, entry in root.tables("obstacles")),
+        obstacles=tuple(_obstacle(source, path, entry, moving) for path, entry in root.tables("obstacles")),
         task=parse_task(root.table("task", TASK_KEYS), limits),
         planner=planner,
         joints=_joints(root, links),
@@ -167,6 +170,7 @@ def scene_from_toml(data: dict[str, object], source: str) -> Scene:
         limit_switches=parse_limit_switches(root, links),
         roadmap=parse_roadmap(root.table("roadmap", ROADMAP_KEYS, optional=True)),
         dc_motors=parse_dc_motors(root.table("dc_motors", DC_MOTOR_KEYS, optional=True), links),
+        moving=moving,
     )
 
 
@@ -257,21 +261,23 @@ def _workspace(table: Table) -> WorkspaceSpec:
     return workspace
 
 
-def _obstacle(source: str, path: str, data: object) -> Obstacle:
+def _obstacle(source: str, path: str, data: object, moving: MovingSpec | None) -> Obstacle:
     entry = Table.with_keys(source, path, data, sorted({*ROUND_KEYS, *POLYGON_KEYS}))
     shape = entry.choice("shape", SHAPES)
+    motion = read_obstacle_motion(entry, moving)
     if shape == "polygon":
         table = Table.with_keys(source, path, data, POLYGON_KEYS)
         vertices = table.points("vertices_cm", within=LARGEST_CM)
         problem = polygon_problem(vertices)
         if problem:
             table.fail("vertices_cm", problem)
-        return Obstacle(shape, vertices_cm=vertices)
+        return Obstacle(shape, vertices_cm=vertices, motion=motion)
     table = Table.with_keys(source, path, data, ROUND_KEYS)
     return Obstacle(
         shape,
         center_cm=table.point("center_cm", within=LARGEST_CM),
         diameter_cm=table.number("diameter_cm", above=0.0, at_most=LARGEST_CM),
+        motion=motion,
     )
 
 

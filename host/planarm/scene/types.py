@@ -9,6 +9,7 @@ from planarm.scene.joint_space import JointSpaceSpec
 from planarm.scene.limit_switches import LimitSwitchSpec
 from planarm.scene.mechanics import Matrix, MechanicsSpec
 from planarm.scene.motor import MotorSpec
+from planarm.scene.moving import MovingSpec, ObstacleMotion
 from planarm.scene.roadmap import RoadmapSpec
 from planarm.scene.task import Point, Range, TaskSpec
 
@@ -82,6 +83,8 @@ class Obstacle:
     center_cm: Point | None = None
     diameter_cm: float | None = None
     vertices_cm: tuple[Point, ...] | None = None
+    motion: ObstacleMotion | None = None
+    """How it moves; None: it rests."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -175,6 +178,8 @@ class Scene:
     roadmap: RoadmapSpec = field(default_factory=RoadmapSpec)
     dc_motors: DcMotorSpec | None = None
     """None stands for the usual ones (`DcMotorSpec.usual`)."""
+    moving: MovingSpec | None = None
+    """How to plan in space and time; None: obstacles rest."""
 
     @property
     def margin_cm(self) -> float:

@@ -1,0 +1,1 @@
+"""Search among moving obstacles: exactly in space and time, and by D* as paper B has it."""
