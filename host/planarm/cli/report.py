@@ -62,25 +62,40 @@ def _print(groups: list[GroupRow], failed: list[Failure], figures: list[str], ti
 
     console = terminal()
     console.print(title, markup=False)
-    console.print(_groups_table(groups, figures))
+    console.print(_verdicts_table(groups))
+    for figure in figures:
+        console.print(_spread_table(groups, figure))
     for failure in failed:
         console.print(f"{failure.runs} x {failure.verdict}: {failure.reason}", markup=False, highlight=False)
         console.print(f"    again: {failure.example}", markup=False, highlight=False)
 
 
-def _groups_table(groups: list[GroupRow], figures: list[str]) -> Table:
+def _verdicts_table(groups: list[GroupRow]) -> Table:
+    verdicts = sorted({verdict for group in groups for verdict in group.verdicts})
+    table = _table(groups, "", ("runs", *verdicts))
+    for group in groups:
+        counts = (f"{group.verdicts.get(verdict, 0):,}" for verdict in verdicts)
+        table.add_row(*map(str, group.settings.values()), f"{group.runs:,}", *counts)
+    return table
+
+
+def _spread_table(groups: list[GroupRow], figure: str) -> Table:
+    table = _table(groups, figure, ("5 %", "median", "95 %"))
+    for group in groups:
+        spread = (f"{value:.5g}" for value in group.figures.get(figure, ()))
+        table.add_row(*map(str, group.settings.values()), *spread)
+    return table
+
+
+def _table(groups: list[GroupRow], title: str, columns: tuple[str, ...]) -> Table:
+    """Return an empty table: a row a group, its settings first."""
     from rich import box
     from rich.table import Table
 
-    table = Table(box=box.SIMPLE_HEAD, pad_edge=False, caption="figures: 5 % / median / 95 %", caption_justify="left")
+    table = Table(box=box.SIMPLE_HEAD, pad_edge=False, title=title, title_justify="left")
     settings = list(groups[0].settings) if groups else []
-    verdicts = sorted({verdict for group in groups for verdict in group.verdicts})
-    for name in (*(s.removeprefix("set.") for s in settings), "runs", *verdicts, *figures):
-        table.add_column(name, justify="right")
-    for group in groups:
-        spreads = [" / ".join(f"{v:.5g}" for v in group.figures[f]) if f in group.figures else "" for f in figures]
-        counts = [str(group.verdicts.get(verdict, 0)) for verdict in verdicts]
-        table.add_row(*(str(group.settings[s]) for s in settings), f"{group.runs:,}", *counts, *spreads)
+    for name in (*(s.split(".")[-1] for s in settings), *columns):
+        table.add_column(name, justify="right", no_wrap=True)
     return table
 
 
