@@ -1,9 +1,26 @@
-"""Compile or load every planning kernel before anything is timed, by planning a scene that takes a few milliseconds."""
+"""Compile or load every kernel before anything is timed, by planning a scene that takes a few milliseconds.
+
+Run as a program it does one of its parts: `planarm.first_start` runs them side by side.
+"""
 
 from __future__ import annotations
 
-from planarm.pipeline import plan_scene
+import sys
+from contextlib import closing
+
+import numpy as np
+
+from planarm.link.arm_record import ArmSetup
+from planarm.link.transport import open_transport
+from planarm.model.arm import Arm
+from planarm.pipeline import plan_scene, planning_margin_cm
+from planarm.route import find_route
 from planarm.scene import parse_scene
+from planarm.smoothing.joint_spline import JointSpline
+from planarm.stepping.certify import certify
+from planarm.stepping.schedule import schedule
+from planarm.trajectory.limits import Limits
+from planarm.trajectory.timing import fastest_motion
 
 SMALL_SCENE = """
 name = "warm-up"
@@ -47,8 +64,45 @@ max_acceleration_deg_s2 = 2000
 PLANNERS = ("", '[planner]\nalgorithm = "a_star"\n')
 """The default, and one whose paths have corners that are no obstacle's."""
 
+MOMENT_S = 0.001
+
+POSES_RAD = ((0.0, -0.6), (0.5, -1.2), (1.0, -0.8))
+
 
 def warm_up() -> None:
     """Plan the small scene; the first time on a machine this compiles, later it loads from the cache."""
     for planner in PLANNERS:
         plan_scene(parse_scene(SMALL_SCENE + planner, "warm-up"), lambda _stage, _share: None)
+
+
+def warm_up_search() -> None:
+    """Do the part of `warm_up` up to the smooth path."""
+    for planner in PLANNERS:
+        scene = parse_scene(SMALL_SCENE + planner, "warm-up")
+        find_route(scene, planning_margin_cm(scene))
+
+
+def warm_up_motion() -> None:
+    """Do the part of `warm_up` from a smooth path to the certificate."""
+    scene = parse_scene(SMALL_SCENE, "warm-up")
+    poses = np.array(POSES_RAD)
+    none = np.zeros(poses[:-1].shape)
+    straight = np.ascontiguousarray(np.stack([poses[:-1], np.diff(poses, axis=0), none, none], axis=1))
+    path = JointSpline(Arm.from_spec(scene.arm), np.arange(float(len(poses))), straight, np.array([1.0]))
+    motion = fastest_motion(path, Limits.of(scene))
+    trajectory, train, segments = schedule(scene, lambda _limit: motion)
+    certify(scene, trajectory, train, segments)
+
+
+def warm_up_emulator() -> None:
+    """Start the emulated board with an arm around it, for a moment."""
+    scene = parse_scene(SMALL_SCENE, "warm-up")
+    with closing(open_transport("sim://", scene.link.baud, ArmSetup(scene, (0, 0)))) as transport:
+        if transport.arm:
+            transport.arm.settle(MOMENT_S)
+
+
+PARTS = {"search": warm_up_search, "motion": warm_up_motion, "emulator": warm_up_emulator}
+
+if __name__ == "__main__":
+    PARTS[sys.argv[1]]()

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from planarm.cli.progress import progress
-from planarm.cli.scenes import tell_first_compile
+from planarm.cli.scenes import compile_first
 from planarm.cli.terminal import terminal
 from planarm.errors import UsageError
 from planarm.output import writing
@@ -25,7 +25,7 @@ def execute(options: argparse.Namespace) -> int:
     """Compute the comparison, print it, and write it down where --out says."""
     if (options.table is None) == (options.external is None):
         raise UsageError("give table2, or --external CMD")
-    tell_first_compile("planarm")
+    compile_first("planarm")
     if options.external is not None:
         return _external(options)
     return _as_printed(options) if options.as_printed else _table2(options)

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from planarm.cli.progress import progress
-from planarm.cli.scenes import chosen_scene, tell_first_compile
+from planarm.cli.scenes import chosen_scene, compile_first
 from planarm.cli.terminal import terminal
 from planarm.output import writing
 
@@ -27,7 +27,7 @@ def execute(options: argparse.Namespace) -> int:
     import numpy as np
 
     scene = chosen_scene(options)
-    tell_first_compile("planarm")
+    compile_first("planarm")
     from planarm.envelope.largest import largest_feed, largest_payload_kg
     from planarm.envelope.maps import envelope_maps
     from planarm.envelope.snap import snap

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from planarm.cli.progress import progress
-from planarm.cli.scenes import chosen_scene, tell_first_compile
+from planarm.cli.scenes import chosen_scene, compile_first
 from planarm.cli.terminal import terminal
 from planarm.errors import UsageError
 
@@ -26,7 +26,7 @@ def execute(options: argparse.Namespace) -> int:
     if not options.alternatives and not options.output:
         raise UsageError("give -o FILE.plan for a plan, or --alternatives K to see the routes")
     scene = chosen_scene(options)
-    tell_first_compile("planarm")
+    compile_first("planarm")
     if options.alternatives:
         routes = _alternatives(scene, options)
         if not options.output:

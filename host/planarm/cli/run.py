@@ -8,7 +8,7 @@ import shlex
 from pathlib import Path
 
 from planarm.cli.progress import progress
-from planarm.cli.scenes import chosen_scene, tell_first_compile
+from planarm.cli.scenes import chosen_scene, compile_first
 from planarm.cli.terminal import terminal
 from planarm.errors import PlanarmError
 
@@ -16,7 +16,7 @@ from planarm.errors import PlanarmError
 def execute(options: argparse.Namespace) -> int:
     """Run the whole flow and print its summary."""
     scene = chosen_scene(options)
-    tell_first_compile("planarm", "planarm_sim")
+    compile_first("planarm", "planarm_sim")
     from planarm.pipeline import run_scene
     from planarm.warm_up import warm_up
 

@@ -6,6 +6,7 @@ import argparse
 import sys
 from pathlib import Path
 
+from planarm.first_start import compile_parts
 from planarm.scene import Scene, load_scene, with_planner, with_space
 from planarm_wire.kernel_cache import is_cold
 
@@ -24,3 +25,11 @@ def tell_first_compile(*packages: str) -> None:
     """Say why the first run takes longer, before it does."""
     if any(is_cold(package) for package in packages):
         print("Compiling the numeric kernels, once a version: about a minute ...", file=sys.stderr)
+
+
+def compile_first(*packages: str) -> None:
+    """On the first start of a version, say so and compile the kernels on all cores."""
+    cold = tuple(package for package in packages if is_cold(package))
+    tell_first_compile(*cold)
+    if cold:
+        compile_parts(cold)

@@ -213,7 +213,7 @@ def expand(  # noqa: C901, PLR0912, PLR0915 - one flat loop: a call that hands o
             break
         ring[bucket & mask] = below[entry]
         waiting -= 1
-        node = int(queued[entry])
+        node = int(np.int64(queued[entry]))
         from_g = g[node] - 1
         if from_g & 1:  # expanded since it was put here
             continue
@@ -295,11 +295,11 @@ def next_best_move(
     Candidates are proved in the order of cost, then of the moves, until one is legal; the move by which the node
     was reached is known not to be.
     """
-    scratch = np.arange(moves.jump.size)
+    scratch = np.empty(moves.jump.size, np.int64)
     failed = (state[node] & (CHECKED - 1)) - REACHED
     last_g, last_move = -1, -1
     while True:
-        best, best_g = NONE, UNREACHED
+        best, best_g = int(np.int64(NONE)), UNREACHED
         for k in range(moves.jump.size):
             source = node - moves.jump[k]
             if k == failed or state[source] <= WHOLE_ROOM or g[source] & 1:
@@ -309,7 +309,7 @@ def next_best_move(
                 continue
             if rules.drawn > 0:
                 draw_subset(scratch, rules.drawn, rules.seed, 1 + source)
-                if not np.any(scratch[: rules.drawn] == k):
+                if not is_among(scratch, rules.drawn, k):
                     continue
             best, best_g = k, through
         if best == NONE:
@@ -317,6 +317,15 @@ def next_best_move(
         if move_is_legal(lattice, moves, rules, world, node, best):
             return best, best_g
         last_g, last_move = best_g, best
+
+
+@kernel
+def is_among(values: NDArray[np.int64], count: int, wanted: int) -> bool:
+    """Tell whether a value is one of the first `count`."""
+    found = False
+    for i in range(count):
+        found = found or values[i] == wanted
+    return found
 
 
 @kernel

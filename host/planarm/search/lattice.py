@@ -24,13 +24,17 @@ def make_lattice(free_map: FreeMap, border: int) -> Lattice:
 
 @kernel
 def _fill(region: NDArray[np.uint8], whole: NDArray[np.bool_], border: int, room: NDArray[np.uint8]) -> None:
+    # Loops, not slices: Numba takes seconds to compile an assignment to a slice.
     rows, columns = region.shape
-    room[:border] = SHUT
-    room[border + rows :] = SHUT
-    for iy in range(rows):
-        line, regions, wholes = room[border + iy], region[iy], whole[iy]
-        line[:border] = SHUT
-        line[border + columns :] = SHUT
+    for iy in range(room.shape[0]):
+        line = room[iy]
+        if iy < border or iy >= border + rows:
+            for ix in range(room.shape[1]):
+                line[ix] = SHUT
+            continue
+        regions, wholes = region[iy - border], whole[iy - border]
+        for ix in range(border):
+            line[ix] = line[border + columns + ix] = SHUT
         for ix in range(columns):
             line[border + ix] = SHUT if regions[ix] != FREE else (WHOLE_ROOM if wholes[ix] else ROOM)
 

@@ -67,7 +67,7 @@ def _with_cells_between(lattice: Lattice, points: Floats) -> tuple[Floats, Ints]
 def _add_cells(lattice: Lattice, points: Floats, out: Floats, number: Ints) -> int:
     count = 0
     for i in range(points.shape[0] - 1):
-        out[count], number[count] = points[i], i
+        out[count, 0], out[count, 1], number[count] = points[i, 0], points[i, 1], i
         count += 1
         ax, ay, dx, dy = points[i, 0], points[i, 1], points[i + 1, 0] - points[i, 0], points[i + 1, 1] - points[i, 1]
         x, y = round(ax), round(ay)
@@ -86,7 +86,8 @@ def _add_cells(lattice: Lattice, points: Floats, out: Floats, number: Ints) -> i
             if (x != points[i + 1, 0] or y != points[i + 1, 1]) and lattice.room[y * lattice.width + x] != SHUT:
                 out[count, 0], out[count, 1], number[count] = x, y, -1
                 count += 1
-    out[count], number[count] = points[-1], points.shape[0] - 1
+    last = points.shape[0] - 1
+    out[count, 0], out[count, 1], number[count] = points[last, 0], points[last, 1], last
     return count + 1
 
 
@@ -129,7 +130,10 @@ def chain_kernel(
             dx, dy = points[j, 0] - points[i, 0], points[j, 1] - points[i, 1]
             through[i] = length[i] + sqrt(dx * dx + dy * dy)
         while True:
-            i = low + int(np.argmin(through[low:j]))
+            i = low
+            for k in range(low + 1, j):
+                if through[k] < through[i]:
+                    i = k
             if through[i] >= length[j]:
                 break
             if in_sight(lattice, world, legal, points[i, 0], points[i, 1], points[j, 0], points[j, 1]):

@@ -65,7 +65,7 @@ def joined(splines: Sequence[JointSpline]) -> JointSpline:
 
 @kernel
 def _evaluate(borders: Floats, coefficients: Floats, s: Floats, left: bool, q: Floats, dq: Floats, ddq: Floats) -> None:
-    piece = 0
+    piece = int(np.int64(0))  # not a literal, for which `piece_at` would be compiled once more
     for i in range(s.shape[0]):
         piece = piece_at(borders, s[i], left, piece)
         x = s[i] - borders[piece]

@@ -7,7 +7,7 @@ continuous from leg to leg, so q(s) and q'(s) are continuous everywhere but at s
 """
 
 from dataclasses import dataclass
-from math import acos, atan2, cos, nan, sin
+from math import atan2, nan, sqrt
 from typing import NamedTuple
 
 import numpy as np
@@ -108,7 +108,7 @@ def angle_between(a: Floats, b: Floats) -> Floats:
 @kernel
 def _tips(pieces: TipPieces, s: Floats, tips: Floats) -> None:
     borders, starts, slopes, bends = pieces.borders_s, pieces.tips_cm, pieces.slopes, pieces.bends_per_cm
-    piece = 0
+    piece = int(np.int64(0))  # not a literal, for which `piece_at` would be compiled once more
     for i in range(s.shape[0]):
         piece = piece_at(borders, s[i], False, piece)
         x = s[i] - borders[piece]
@@ -128,7 +128,8 @@ def _evaluate(links: TwoLinks, pieces: TipPieces, s: Floats, left: bool, q: Floa
     borders, starts, slopes, bends = pieces.borders_s, pieces.tips_cm, pieces.slopes, pieces.bends_per_cm
     directions = pieces.directions_rad
     l1, l2 = links.l1_cm, links.l2_cm
-    piece = 0
+    squares, twice = l1 * l1 + l2 * l2, 1.0 / (2.0 * l1 * l2)
+    piece = int(np.int64(0))  # not a literal, for which `piece_at` would be compiled once more
     for i in range(s.shape[0]):
         piece = piece_at(borders, s[i], left, piece)
         x = s[i] - borders[piece]
@@ -137,12 +138,16 @@ def _evaluate(links: TwoLinks, pieces: TipPieces, s: Floats, left: bool, q: Floa
         tip_x = ax + x * (slopes[piece, 0] + 0.5 * x * bend_x)
         tip_y = ay + x * (slopes[piece, 1] + 0.5 * x * bend_y)
         slope_x, slope_y = slopes[piece, 0] + x * bend_x, slopes[piece, 1] + x * bend_y
-        direction = directions[piece] + atan2(ax * tip_y - ay * tip_x, ax * tip_x + ay * tip_y)
-        cosine = (tip_x * tip_x + tip_y * tip_y - l1 * l1 - l2 * l2) / (2.0 * l1 * l2)
-        q2 = -links.side * acos(min(1.0, max(-1.0, cosine))) if abs(cosine) <= BEYOND else nan
-        q1 = direction - atan2(l2 * sin(q2), l1 + l2 * cos(q2))
-        ex, ey, fx, fy = l1 * cos(q1), l1 * sin(q1), l2 * cos(q1 + q2), l2 * sin(q1 + q2)
-        q[i, 0], q[i, 1] = q1, q2
+        cosine = (tip_x * tip_x + tip_y * tip_y - squares) * twice
+        sine = -links.side * sqrt(max(0.0, (1.0 - cosine) * (1.0 + cosine))) if abs(cosine) <= BEYOND else nan
+        # The tip as link 1 sees it, along and aside; turned to where the tip is, link 1 points along e.
+        along, aside = l1 + l2 * cosine, l2 * sine
+        r2 = along * along + aside * aside
+        turn = l1 / r2 if r2 > 0.0 else nan
+        ex, ey = turn * (along * tip_x + aside * tip_y), turn * (along * tip_y - aside * tip_x)
+        fx, fy = tip_x - ex, tip_y - ey
+        q[i, 0] = directions[piece] + atan2(ax * tip_y - ay * tip_x, ax * tip_x + ay * tip_y) - atan2(aside, along)
+        q[i, 1] = atan2(sine, cosine)
         w1, w2 = _turning_rates(ex, ey, fx, fy, slope_x, slope_y)
         dq[i, 0], dq[i, 1] = w1, w2 - w1
         pull_x, pull_y = bend_x + ex * w1 * w1 + fx * w2 * w2, bend_y + ey * w1 * w1 + fy * w2 * w2

@@ -72,7 +72,8 @@ def report_timing(trajectory: Trajectory, limits: Limits) -> TimingReport:
     """
     if len(trajectory.t_s) == 1:
         return TimingReport((), 0.0, limits.acceleration_share, 0.0)
-    use = limit_use(trajectory, limits)
+    grid = Grid.on(trajectory.path, trajectory.s, trajectory.s_dot**2)
+    use = limit_use(trajectory, limits, grid.samples)
     names: tuple[LimitName, ...] = ("speed", "acceleration", "torque")
     most = np.stack([use.speed, use.acceleration, use.torque], axis=1).reshape(len(use.slack), -1).argmax(axis=1)
     shares = np.bincount(most, np.diff(trajectory.t_s), minlength=3 * limits.joints) / trajectory.duration_s
@@ -81,15 +82,13 @@ def report_timing(trajectory: Trajectory, limits: Limits) -> TimingReport:
         for k in np.argsort(-shares, kind="stable")
         if shares[k] > 0.0
     ]
-    full_s = _full_acceleration_s(trajectory, limits)
+    full_s = _full_acceleration_s(trajectory, grid, limits)
     return TimingReport(tuple(binding), trajectory.duration_s, limits.acceleration_share, full_s)
 
 
-def _full_acceleration_s(trajectory: Trajectory, limits: Limits) -> float:
+def _full_acceleration_s(trajectory: Trajectory, grid: Grid, limits: Limits) -> float:
     """Return the duration with all of the acceleration, on the motion's own grid."""
     if limits.acceleration_share >= 1.0:
         return trajectory.duration_s
-    ones = np.ones((len(trajectory.s) - 1, limits.joints))
-    grid = Grid(trajectory.s, ones, ones, ones, trajectory.s_dot**2)
     full = replace(limits, accelerations_rad_s2=limits.accelerations_rad_s2 / limits.acceleration_share, share=HEADROOM)
     return min(trajectory.duration_s, solve(trajectory.path, grid, full).duration_s)

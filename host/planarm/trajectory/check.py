@@ -15,9 +15,8 @@ from planarm.dynamics.pull_out import Drives, pull_out_nm
 from planarm.smoothing.smooth_path import Floats
 from planarm.trajectory.limits import Limits
 from planarm.trajectory.motion import Trajectory
+from planarm.trajectory.samples import Samples, take_samples
 from planarm_wire.kernel_cache import kernel
-
-SUBSTEPS = 10
 
 MOST = 1e3
 """The use of a torque of which nothing is left."""
@@ -46,24 +45,19 @@ class LimitUse:
         return float(max(self.speed.max(), self.acceleration.max(), self.torque.max()))
 
 
-def limit_use(trajectory: Trajectory, limits: Limits) -> LimitUse:
-    """Return the use of the limits, with both one-sided accelerations at every gridpoint."""
-    shares = np.arange(SUBSTEPS + 1) / SUBSTEPS
+def limit_use(trajectory: Trajectory, limits: Limits, samples: Samples | None = None) -> LimitUse:
+    """Return the use of the limits, with both one-sided accelerations at every gridpoint.
+
+    `samples` are the path's on the trajectory's grid where they are known; they are taken if not.
+    """
     lengths = np.diff(trajectory.s)
-    s = trajectory.s[:-1, None] + lengths[:, None] * shares
-    s[:, -1] = trajectory.s[1:]
-    inner = trajectory.path.evaluate(s[:, :-1].ravel(), "right")
-    ends = trajectory.path.evaluate(s[:, -1], "left")
-    shape = (len(lengths), SUBSTEPS, -1)
-    q, dq, ddq = (
-        np.concatenate([values.reshape(shape), last[:, None]], axis=1) for values, last in zip(inner, ends, strict=True)
-    )
+    q, dq, ddq = samples or take_samples(trajectory.path, trajectory.s[:-1], trajectory.s[1:])
     x = trajectory.s_dot**2
     speed, acceleration, torque = np.zeros((3, len(lengths), limits.joints))
-    nearest = np.zeros((len(lengths), SUBSTEPS + 1))
+    nearest = np.zeros(dq.shape[:2])
     _kinematic_use(lengths, x, dq, ddq, limits.speeds_rad_s, limits.accelerations_rad_s2, speed, acceleration, nearest)
     if limits.load is not None:
-        flat = (len(lengths) * (SUBSTEPS + 1), -1)
+        flat = (nearest.size, -1)
         senses = np.sign(dq)
         senses[:, [0, -1]] = senses[:, [1, -2]]  # a joint that turns back does so at a gridpoint
         terms = motor_terms(limits.load, *(np.ascontiguousarray(v.reshape(flat)) for v in (q, dq, ddq, senses)))

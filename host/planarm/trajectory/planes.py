@@ -9,7 +9,7 @@ is above it, and its chord below.
 """
 
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import NamedTuple, Self
 
 import numpy as np
 
@@ -17,13 +17,15 @@ from planarm.dynamics.motor_terms import MotorTerms, motor_terms
 from planarm.errors import TimingError
 from planarm.smoothing.smooth_path import Floats, JointState, SmoothPath
 from planarm.trajectory.limits import Limits
+from planarm.trajectory.samples import Samples, take_samples
 
 REST_SHARE = 1e-12
 """Where the motion rests, the chord of sqrt(x) ends at this share of the largest x instead of at 0."""
 
 SLOW_SHARE = 0.05
 MOST_HALVINGS = 60
-BISECTIONS = 50
+NEWTON_STEPS = 12
+"""Each halves the bracket at least; near a turning point it squares the error."""
 NEAR = 1e-9
 """A turning point this near to a gridpoint, as a share of the path, is not told from it."""
 
@@ -37,14 +39,23 @@ class Grid:
         speed_share, acceleration_share, torque_share: shape (m - 1, n).
         tangent_x: squared path speed at which the torque's tangents touch, shape (m,); zero for the flat torque alone.
         growth: how many times `tangent_x`, or a share of its peak, the squared path speed may be.
+        samples: the path in every interval.
     """
 
     s: Floats
+    samples: Samples
     speed_share: Floats
     acceleration_share: Floats
     torque_share: Floats
     tangent_x: Floats
     growth: float = np.inf
+
+    @classmethod
+    def on(cls, path: SmoothPath, s: Floats, tangent_x: Floats | None = None) -> Self:
+        """Return the grid with these gridpoints and all of every limit."""
+        samples = take_samples(path, s[:-1], s[1:])
+        ones = np.ones((len(s) - 1, samples.q_rad.shape[2]))
+        return cls(s, samples, ones, ones, ones, np.zeros(len(s)) if tangent_x is None else tangent_x)
 
 
 class Ends(NamedTuple):
@@ -56,35 +67,39 @@ class Ends(NamedTuple):
     end_terms: MotorTerms | None
 
 
-def path_ends(path: SmoothPath, s: Floats, limits: Limits) -> Ends:
-    """Evaluate the path and its load at both ends of every interval between the gridpoints s."""
-    start, end = path.evaluate(s[:-1], "right"), path.evaluate(s[1:], "left")
+def path_ends(samples: Samples, limits: Limits) -> Ends:
+    """Return the path and its load at both ends of every interval."""
+    start, end = samples.starts, samples.ends
     if limits.load is None:
         return Ends(start, end, None, None)
-    senses = np.sign(path.evaluate(0.5 * (s[:-1] + s[1:])).dq_rad)
-    return Ends(start, end, motor_terms(limits.load, *start, senses), motor_terms(limits.load, *end, senses))
+    return Ends(start, end, *(motor_terms(limits.load, *state, samples.senses) for state in (start, end)))
 
 
 def with_turning_points(path: SmoothPath, s: Floats) -> Floats:
     """Return the gridpoints and between them the points at which a joint turns back: there its friction jumps."""
     rates = path.evaluate(s[:-1], "right").dq_rad, path.evaluate(s[1:], "left").dq_rad
     interval, joint = np.nonzero(rates[0] * rates[1] < 0.0)
+    if not len(joint):
+        return s
     low, high, before = s[interval], s[interval + 1], rates[0][interval, joint]
-    for _ in range(BISECTIONS):
-        middle = 0.5 * (low + high)
-        same = path.evaluate(middle).dq_rad[np.arange(len(joint)), joint] * before > 0.0
-        low, high = np.where(same, middle, low), np.where(same, high, middle)
-    turning = high[(high - s[interval] > NEAR * s[-1]) & (s[interval + 1] - high > NEAR * s[-1])]
+    at, each = 0.5 * (low + high), np.arange(len(joint))
+    for _ in range(NEWTON_STEPS):
+        state = path.evaluate(at)
+        rate, bend = state.dq_rad[each, joint], state.ddq_rad[each, joint]
+        low, high = np.where(rate * before > 0.0, at, low), np.where(rate * before > 0.0, high, at)
+        newton = at - np.divide(rate, bend, out=np.full(len(at), np.inf), where=bend != 0.0)
+        at = np.where((low <= newton) & (newton <= high), newton, 0.5 * (low + high))
+    turning = at[(at - s[interval] > NEAR * s[-1]) & (s[interval + 1] - at > NEAR * s[-1])]
     return np.asarray(np.unique(np.concatenate([s, turning])))
 
 
-def require_holding(path: SmoothPath, s: Floats, limits: Limits) -> None:
+def require_holding(path: SmoothPath, grid: Grid, limits: Limits) -> None:
     """Check that every motor can hold what it carries, and move it against friction, with something left.
 
     Raises:
         TimingError: one cannot; the message names motor, place and what is missing.
     """
-    ends = path_ends(path, s, limits)
+    ends, s = path_ends(grid.samples, limits), grid.s
     if limits.load is None or ends.start_terms is None or ends.end_terms is None:
         return
     flat = limits.load.drives.flat_nm

@@ -20,6 +20,7 @@ from planarm.trajectory.check import LimitUse, limit_use
 from planarm.trajectory.limits import STOPPING_SHARE, Limits
 from planarm.trajectory.motion import Trajectory
 from planarm.trajectory.planes import Grid, half_planes, path_ends, require_holding, squared_limits, with_turning_points
+from planarm.trajectory.samples import halve_some
 from planarm.trajectory.topp import fastest_squared_speeds
 
 __all__ = ["STOPPING_SHARE", "SpeedCap", "Trajectory", "fastest_motion", "time_path"]
@@ -81,13 +82,11 @@ def fastest_motion(
         s = with_turning_points(path, s)
     if not np.ptp(path.evaluate(s).q_rad, axis=0).any():
         return Trajectory(path, np.zeros(1), s[:1], np.zeros(1), path.evaluate(s[:1]).q_rad)
-    ones = np.ones((len(s) - 1, limits.joints))
-    grid = Grid(s, ones, ones, ones, np.zeros(len(s)))
-    grid, trajectory = _refined(path, grid, replace(limits, load=None), speed_cap, rounds)
+    grid, trajectory = _refined(path, Grid.on(path, s), replace(limits, load=None), speed_cap, rounds)
     if limits.load is None:
         return trajectory
-    require_holding(path, grid.s, limits)
-    if limit_use(trajectory, limits).torque.max() <= 1.0:
+    require_holding(path, grid, limits)
+    if limit_use(trajectory, limits, grid.samples).torque.max() <= 1.0:
         return trajectory  # the fastest without the torque's limit keeps it
     return _refined(path, replace(grid, tangent_x=trajectory.s_dot**2), limits, speed_cap, rounds)[1]
 
@@ -97,7 +96,7 @@ def _refined(
 ) -> tuple[Grid, Trajectory]:
     """Solve, look, refine and solve again; return the last grid, and the motion made to keep every limit."""
     trajectory = solve(path, grid, limits, speed_cap)
-    before_s, use = np.inf, limit_use(trajectory, limits)
+    before_s, use = np.inf, limit_use(trajectory, limits, grid.samples)
     for _ in range(rounds):
         coarse = _coarse(trajectory, use)
         change_s = abs(before_s - trajectory.duration_s)
@@ -107,7 +106,7 @@ def _refined(
         before_s = trajectory.duration_s
         grid = _refine(grid, trajectory, use, coarse, np.inf if limits.load is None else GROWTH)
         trajectory = solve(path, grid, limits, speed_cap)
-        use = limit_use(trajectory, limits)
+        use = limit_use(trajectory, limits, grid.samples)
     return grid, _slowed(trajectory, _slowing(use))
 
 
@@ -151,7 +150,7 @@ def solve(path: SmoothPath, grid: Grid, limits: Limits, speed_cap: SpeedCap | No
         TimingError: a motor cannot hold the arm, or nothing moves in some interval.
     """
     s = grid.s
-    ends = path_ends(path, s, limits)
+    ends = path_ends(grid.samples, limits)
     rest = np.flatnonzero(np.isin(s, path.stops_s))
     x_limits = squared_limits(ends, grid, limits, np.concatenate([[0], rest, [len(s) - 1]]))
     if speed_cap is not None:
@@ -189,10 +188,9 @@ def _refine(grid: Grid, trajectory: Trajectory, use: LimitUse, coarse: NDArray[n
             (grid.torque_share, use.torque),
         )
     )
-    middles = 0.5 * (grid.s[:-1] + grid.s[1:])
-    s = np.sort(np.concatenate([grid.s, middles[coarse]]))
+    s, samples = halve_some(trajectory.path, grid.s, grid.samples, coarse)
     tangent_x = np.interp(s, trajectory.s, trajectory.s_dot**2)
-    return Grid(s, speed_share, acceleration_share, torque_share, tangent_x, growth)
+    return Grid(s, samples, speed_share, acceleration_share, torque_share, tangent_x, growth)
 
 
 def _slowing(use: LimitUse) -> float:

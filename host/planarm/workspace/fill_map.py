@@ -62,7 +62,7 @@ def fill(
         for left in range(0, columns, block):
             for i in range(obstacles):
                 near[i] = i
-            stack[0] = top, left, block, 0
+            stack[0, 0], stack[0, 1], stack[0, 2], stack[0, 3] = top, left, block, 0
             _fill_block(world, x_cm, y_cm, cell_cm, region, whole, stack, near, obstacles)
 
 
@@ -97,14 +97,16 @@ def _fill_block(
         dx, dy = 0.5 * (x_cm[right - 1] - x_cm[ix] + cell_cm), 0.5 * (y_cm[bottom - 1] - y_cm[iy] + cell_cm)
         verdict, no_limit, kept = judge_block(world, x, y, sqrt(dx * dx + dy * dy), near, first, end)
         if verdict != MIXED_BLOCK:
-            region[iy:bottom, ix:right] = verdict
-            whole[iy:bottom, ix:right] = verdict == FREE
+            for y_at in range(iy, bottom):  # a slice takes Numba seconds to compile
+                for x_at in range(ix, right):
+                    region[y_at, x_at], whole[y_at, x_at] = verdict, verdict == FREE
         elif size <= LEAF_CELLS:
             _fill_cells(world, x_cm, y_cm, cell_cm, region, whole, iy, bottom, ix, right, near[end:kept], no_limit)
         else:
             half = size // 2
             for i in range(4):
-                stack[depth] = iy + (i >> 1) * half, ix + (i & 1) * half, half, end
+                stack[depth, 0], stack[depth, 1] = iy + (i >> 1) * half, ix + (i & 1) * half
+                stack[depth, 2], stack[depth, 3] = half, end
                 ends[depth] = kept
                 depth += 1
 
