@@ -29,7 +29,7 @@ from planarm_sim.plant.pull_out import pull_out_steps_s
 DOCS = Path(__file__).resolve().parent
 EXAMPLES = DOCS.parent / "examples"
 CURVE_POINTS = 600
-LOAD_SHARES = (0.2, 0.35, 0.5, 0.6, 0.7, 0.8, 0.85)
+LOAD_SHARES = (0.25, 0.35, 0.5, 0.6, 0.7, 0.8, 0.9, 0.95)
 POSES_SHOWN = 9
 
 
@@ -71,18 +71,20 @@ def _draw_plan(scene_file: Path, target: Path) -> None:
 
 
 def _draw_pull_out(target: Path) -> None:
-    """Draw which torque the emulated motor pulls up to which speed, for three supplies, beside V / (2 L I)."""
+    """Draw which torque the emulated motor's field makes up to which speed, for three supplies, beside V / (2 L I)."""
     figure = new_figure(9.0, 4.2)
     axes = figure.subplots()
     dress(axes)
     for colour, supply_v in zip(JOINT_COLOURS, (12.0, 24.0, 36.0), strict=False):
-        motor = Motor(supply_v=supply_v, current_a=1.7)
-        loads_nm = [share * motor.peak_torque_nm for share in LOAD_SHARES]
+        motor = Motor(supply_v=supply_v, current_a=1.7, detent_torque_nm=0.0)
+        own_nm = motor.damping_nm_s * 2.0 * np.pi / motor.steps_per_rev  # of its damping, for a full step a second
+        loads_nm = [share * motor.peak_torque_nm - own_nm * motor.corner_steps_s for share in LOAD_SHARES]
         speeds = [pull_out_steps_s(motor, load, acceleration_steps_s2=8000.0) for load in loads_nm]
-        axes.plot(speeds, loads_nm, "o-", color=colour, linewidth=2.0, label=f"{supply_v:g} V")
+        made_nm = [load + own_nm * speed for load, speed in zip(loads_nm, speeds, strict=True)]
+        axes.plot(speeds, made_nm, "o-", color=colour, linewidth=2.0, label=f"{supply_v:g} V")
         axes.axvline(motor.corner_steps_s, color=colour, linewidth=1.2, linestyle=(0, (5, 3)))
     axes.set_xlabel("full steps a second", fontsize=TEXT_SIZE, color=INK)
-    axes.set_ylabel("torque pulled (N m)", fontsize=TEXT_SIZE, color=INK)
+    axes.set_ylabel("torque of load and own damping (N m)", fontsize=TEXT_SIZE, color=INK)
     axes.set_xlim(0.0)
     axes.set_ylim(0.0)
     axes.legend(frameon=False)

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from planarm_sim.bench import Bench, BenchReport
     from planarm_sim.board import Pin, Uno, UnoSnapshot
     from planarm_sim.drivers import DriverWiring, driver_row
-    from planarm_sim.plant import CircleObstacle, Joint, LimitSwitch, Link, Motor, PolygonObstacle, Rig
+    from planarm_sim.plant import CircleObstacle, Joint, LimitSwitch, Link, Motor, PolygonObstacle, Rig, desk_arm
 
 __all__ = [
     "Bench",
@@ -39,6 +39,7 @@ __all__ = [
     "SimError",
     "Uno",
     "UnoSnapshot",
+    "desk_arm",
     "driver_row",
 ]
 
@@ -46,7 +47,7 @@ _ROOMS = {
     "bench": ("Bench", "BenchReport"),
     "board": ("Pin", "Uno", "UnoSnapshot"),
     "drivers": ("DriverWiring", "driver_row"),
-    "plant": ("CircleObstacle", "Joint", "LimitSwitch", "Link", "Motor", "PolygonObstacle", "Rig"),
+    "plant": ("CircleObstacle", "Joint", "LimitSwitch", "Link", "Motor", "PolygonObstacle", "Rig", "desk_arm"),
 }
 _ROOM_OF = {name: room for room, names in _ROOMS.items() for name in names}
 

@@ -89,16 +89,18 @@ def summary(result: Emulation) -> str:
 
 
 def bench_summary(report: BenchReport) -> str:
-    """What the arm did, in a line."""
+    """What the arm did, in a line, and what faults did to it."""
     if report.clean:
         steps = " / ".join(f"{count.made:+.0f}" for count in report.counts)
-        return f"arm: {steps} micro-steps, none lost, no rule broken, nothing touched"
-    lost = " / ".join(map(str, report.lost_full_steps))
-    rules = ", ".join(sorted({violation.rule for violation in report.violations})) or "none"
-    return (
-        f"arm: full steps lost {lost} in {len(report.slips)} slips; rules broken: {rules} "
-        f"({len(report.violations)} times); touches: {len(report.contacts)}; stops hit: {len(report.stop_hits)}"
-    )
+        told = f"arm: {steps} micro-steps, none lost, no rule broken, nothing touched"
+    else:
+        lost = " / ".join(map(str, report.lost_full_steps))
+        rules = ", ".join(sorted({violation.rule for violation in report.violations})) or "none"
+        told = (
+            f"arm: full steps lost {lost} in {len(report.slips)} slips; rules broken: {rules} "
+            f"({len(report.violations)} times); touches: {len(report.contacts)}; stops hit: {len(report.stop_hits)}"
+        )
+    return "\n".join([told, *(f"fault: {line}" for line in report.faults)])
 
 
 def insight_summary(insight: Insight) -> str:

@@ -31,8 +31,12 @@ from planarm_sim.plant import Contact, Plant, Rig, Slip, StopHit
 
 __all__ = ["Bench", "BenchReport"]
 
-SLICE_CYCLES = 16_000
-"""How far the board runs ahead of the arm, 1 ms; with limit switches a tenth of that."""
+SLICE_CYCLES = 160_000
+"""How far the board runs ahead of the arm, 10 ms, when nothing that the arm does can reach it."""
+ATTENTIVE_SLICE_CYCLES = 16_000
+"""The same while the first step is waited for, 1 ms."""
+SWITCH_SLICE_CYCLES = 1600
+"""The same with limit switches, 0.1 ms: how late the board may see one."""
 BOUNCE_CYCLES = 3200
 """Between two bounces of a contact that was just pressed or let go of, 0.2 ms."""
 CHATTER_CYCLES = 16_000
@@ -88,6 +92,7 @@ class BenchReport:
         violations: every broken rule of a driver.
         contacts: every touch of a link and an obstacle.
         stop_hits: every time that a joint ran into a hard stop.
+        faults: what a schedule of faults did, one line each.
     """
 
     cycle: int
@@ -97,6 +102,7 @@ class BenchReport:
     violations: tuple[Violation, ...]
     contacts: tuple[Contact, ...]
     stop_hits: tuple[StopHit, ...]
+    faults: tuple[str, ...] = ()
 
     @property
     def clean(self) -> bool:
@@ -118,6 +124,7 @@ class Bench:
         plant: the arm.
         drivers: the drivers.
         serial: the host's end of the serial line; faults put another in its place.
+        fault_log: what a schedule of faults did, one line each.
     """
 
     serial: SerialLine
@@ -129,12 +136,12 @@ class Bench:
             )
         self.uno = uno
         self.serial = uno.serial
+        self.fault_log: list[str] = []
         self.plant = Plant(rig, uno.cycle, step_cycles=step_cycles)
         levels = [0] * (1 + max(pin.index for pin in PINS))
         for pin in PINS:
             levels[pin.index] = uno.pin(pin.name).level
         self.drivers = DriverBank(drivers, levels, self.plant.start_phases)
-        self._slice_cycles = SLICE_CYCLES // 10 if rig.switches else SLICE_CYCLES
         self._fresh: list[NDArray[Any]] = []
         self._seen_cycle = uno.cycle
         self._agenda: list[tuple[int, int, Callable[[], None]]] = []
@@ -173,16 +180,34 @@ class Bench:
         """
         if (cycles is None) == (seconds is None):
             raise UsageError("run takes either cycles or seconds")
-        end = self.uno.cycle + (round(seconds * CLOCK_HZ) if seconds is not None else int(cycles or 0))
-        if end < self.uno.cycle:
-            raise UsageError(f"run was asked for {end - self.uno.cycle} cycles; time runs forward only")
-        while self.uno.cycle < end:
+        self._advance(round(seconds * CLOCK_HZ) if seconds is not None else int(cycles or 0), 0)
+
+    def run_to_reply(self, *, cycles: int, quiet_cycles: int) -> bool:
+        """Let time pass as `Uno.run_to_reply` does, for the arm too; a slice may end amid a reply."""
+        return self._advance(cycles, quiet_cycles)
+
+    def _advance(self, cycles: int, quiet_cycles: int) -> bool:
+        """Run; with `quiet_cycles` to the end of a reply at the latest, and tell whether there was one."""
+        if cycles < 0:
+            raise UsageError(f"the bench was asked to run for {cycles} cycles; time runs forward only")
+        uno, sent = self.uno, False
+        end = uno.cycle + cycles
+        while uno.cycle < end and not sent:
             self._do_what_is_due()
-            target = min(end, self._seen_cycle + self._slice_cycles, self._next_due())
-            if target > self.uno.cycle:
-                self.uno.run(cycles=target - self.uno.cycle)
-            if self.uno.cycle >= self._seen_cycle + self._slice_cycles:
+            look_at = self._seen_cycle + self._slice_cycles()
+            ahead = min(end, look_at, self._next_due()) - uno.cycle
+            if ahead > 0 and quiet_cycles:
+                sent = uno.run_to_reply(cycles=ahead, quiet_cycles=quiet_cycles)
+            elif ahead > 0:
+                uno.run(cycles=ahead)
+            if uno.cycle >= look_at:
                 self.catch_up()
+        return sent
+
+    def _slice_cycles(self) -> int:
+        if self.plant.rig.switches:
+            return SWITCH_SLICE_CYCLES
+        return ATTENTIVE_SLICE_CYCLES if self._await_step else SLICE_CYCLES
 
     def reset(self) -> None:
         """Press the board's reset button; drivers, motors and arm go on."""
@@ -244,6 +269,7 @@ class Bench:
             violations=self.drivers.violations(),
             contacts=self.plant.contacts(),
             stop_hits=self.plant.stop_hits(),
+            faults=tuple(self.fault_log),
         )
 
     def write_report(self, path: Path) -> None:

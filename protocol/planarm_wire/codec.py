@@ -65,34 +65,47 @@ def _name(kind: type) -> str:
 
 def _write(item: Message | Struct, out: bytearray, place: str) -> None:
     for field in LAYOUTS[type(item)]:
-        here = f"{place}.{field.name}"
         value = getattr(item, field.name)
-        if _is_absent(field, lambda name: getattr(item, name)):
+        if field.when is not None and getattr(item, field.when[0]) < field.when[1]:
             if value != 0:
-                raise WireError(f"{here}: is {value}, but must be 0 while {_condition(field)} does not hold")
+                raise WireError(
+                    f"{place}.{field.name}: is {value}, but must be 0 while {_condition(field)} does not hold"
+                )
         elif field.repeat is None:
-            _write_one(field, value, out, here)
+            _write_one(field, value, out, place, "")
         else:
-            _check_count(field, value, here)
+            _check_count(field, value, f"{place}.{field.name}")
             for index, entry in enumerate(value):
-                _write_one(field, entry, out, f"{here}[{index}]")
+                _write_one(field, entry, out, place, index)
 
 
-def _write_one(field: Field, value: object, out: bytearray, place: str) -> None:
+def _write_one(field: Field, value: object, out: bytearray, place: str, index: int | str) -> None:
+    """Append a value; places are put into words for errors only, as a host writes thousands of numbers a second."""
     if isinstance(field.kind, type):
         if type(value) is not field.kind:
-            raise WireError(f"{place}: is {value!r}, not a {field.kind.__name__}")
-        _write(cast("Struct", value), out, place)
+            raise WireError(f"{_here(place, field, index)}: is {value!r}, not a {field.kind.__name__}")
+        _write(cast("Struct", value), out, _here(place, field, index))
         return
-    if not isinstance(value, SupportsIndex):  # numpy's integers are welcome, floats are not
-        raise WireError(f"{place}: is {value!r}, not a whole number")
-    number = operator.index(value)
-    _check_number(field, number, place)
+    try:
+        number = operator.index(cast("SupportsIndex", value))  # numpy's integers are welcome, floats are not
+    except TypeError:
+        raise WireError(f"{_here(place, field, index)}: is {value!r}, not a whole number") from None
     scalar = SCALARS[field.kind]
-    if field.kind in _VARINTS:
-        out += _leb128((number << 1) ^ (number >> 31) if scalar.signed else number)
-    else:
+    if field.enum is not None or not scalar.minimum <= number <= scalar.maximum:
+        _check_number(field, number, _here(place, field, index))
+    if field.kind not in _VARINTS:
         out += number.to_bytes(scalar.max_bytes, "little", signed=scalar.signed)
+        return
+    if scalar.signed:
+        number = (number << 1) ^ (number >> 31)
+    while number > 0x7F:
+        out.append(number & 0x7F | 0x80)
+        number >>= 7
+    out.append(number)
+
+
+def _here(place: str, field: Field, index: int | str) -> str:
+    return f"{place}.{field.name}" if index == "" else f"{place}.{field.name}[{index}]"
 
 
 def _read(kind: type[Any], data: bytes, at: int, place: str) -> tuple[Any, int]:
@@ -128,15 +141,6 @@ def _read_one(field: Field, data: bytes, at: int, place: str) -> tuple[Any, int]
         number, at = int.from_bytes(data[at:end], "little", signed=scalar.signed), end
     _check_number(field, number, place)
     return (number if field.enum is None else field.enum(number)), at
-
-
-def _leb128(number: int) -> bytes:
-    out = bytearray()
-    while number > 0x7F:
-        out.append(number & 0x7F | 0x80)
-        number >>= 7
-    out.append(number)
-    return bytes(out)
 
 
 def _read_leb128(data: bytes, at: int, place: str) -> tuple[int, int]:

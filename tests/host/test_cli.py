@@ -1,8 +1,10 @@
 """The command line parses and prints: exit codes, JSON on stdout alone, and nothing heavy for --help."""
 
 import json
+import shlex
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import pytest
@@ -102,3 +104,47 @@ def test_a_changed_plan_is_not_streamed(capsys, tmp_path):
     code, _, err = leave(capsys, "stream", str(target))
     assert code == 4
     assert "SHA-256" in err
+
+
+def test_emulate_has_an_arm_around_the_board_and_tells_what_faults_did(tmp_path):
+    """The released firmware keeps its drivers off until it is told otherwise: a bump moves the arm, and is told."""
+    faults = tmp_path / "bump.toml"
+    bump = 'kind = "mechanics.bump"\njoint = 1\ntorque_nm = 0.03\nat_s = 0.05\nfor_s = 0.1\n'
+    faults.write_text(f'zero = "power_up"\n[[faults]]\n{bump}')
+    planarm = Path(sys.executable).with_name("planarm")
+    command = [planarm, "emulate", "--json", "--speed", "max", "--faults", faults]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as board:
+        assert board.stderr is not None
+        assert board.stderr.readline().startswith(("/dev/", "Compiling"))
+        time.sleep(0.5)
+        board.terminate()
+        out, _ = board.communicate()
+    bench = json.loads(out)["bench"]
+    assert [line.split(": ")[1] for line in bench["faults"]] == ["mechanics.bump begins", "mechanics.bump ends"]
+    assert len(bench["counts"]) == 2
+
+
+def test_faults_around_another_program_want_a_scene(capsys, tmp_path):
+    code, _, err = leave(capsys, "emulate", "--firmware", "other.hex", "--faults", str(tmp_path / "any.toml"))
+    assert code == 2
+    assert "--faults needs drivers and an arm around the board: give --scene FILE" in err
+
+
+def test_a_run_that_fails_prints_the_line_that_replays_it(capsys, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("secrets.randbits", lambda bits: 7 % (1 << bits))  # a session's nonce, of each run its own
+    scenarios = EXAMPLES.parent / "tests" / "scenarios"
+    words = (
+        "run",
+        str(scenarios / "arm.toml"),
+        "--faults",
+        str(scenarios / "mechanics_stall.toml"),
+        "--fault-seed",
+        "3",
+    )
+    code, out, err = leave(capsys, *words)
+    assert code == 7
+    replay = next(line for line in err.splitlines() if "replay: " in line).partition("replay: ")[2]
+    program, *again = shlex.split(replay)
+    assert program == "planarm"
+    assert leave(capsys, *again) == (code, out, err)

@@ -124,9 +124,13 @@ REAL = [(2.8e-3, 1.7), (4.2e-3, 1.5)]
 
 
 @pytest.mark.parametrize(("inductance_h", "current_a"), REAL)
-@pytest.mark.parametrize("supply_v", [12.0, 24.0])
-def test_pull_out_at_nine_tenths_of_the_torque_is_at_the_corner_speed(inductance_h, current_a, supply_v):
-    """V / (2 L I) full steps a second (docs of the driver makers; field notes 3.2), within 20 %."""
+@pytest.mark.parametrize("supply_v", [12.0, 24.0, 36.0])
+def test_torque_begins_to_fall_at_the_corner_speed(inductance_h, current_a, supply_v):
+    """V / (2 L I) full steps a second (docs of the driver makers; field notes 3.2), within 20 %.
+
+    The rule is about currents, so the rotor's own damping is a load like any other. "Begins": 5 % less than at rest.
+    Below that speed no step is lost: it is that of the first loss.
+    """
     motor = Motor(
         supply_v=supply_v,
         inductance_h=inductance_h,
@@ -134,8 +138,8 @@ def test_pull_out_at_nine_tenths_of_the_torque_is_at_the_corner_speed(inductance
         rated_current_a=current_a,
         detent_torque_nm=0.0,
     )
-    load_nm = 0.91 * motor.peak_torque_nm
     corner = supply_v / (2 * inductance_h * current_a)
+    load_nm = 0.95 * motor.peak_torque_nm - motor.damping_nm_s * corner * 2 * math.pi / motor.steps_per_rev
     assert pull_out_steps_s(motor, load_nm) == pytest.approx(corner, rel=0.2)
 
 

@@ -390,3 +390,27 @@ def test_analogue_inputs_have_the_boards_names():
         uno.analog("D3")
     with pytest.raises(PinError, match="0 to 5 V"):
         uno.analog("A5").volts = -0.1
+
+
+# --- replies ---
+
+
+def test_a_reply_is_waited_for_to_its_end_and_the_run_is_the_same(echo):
+    whole = echo.fork(1)[0]
+    for uno in (echo, whole):
+        uno.serial.write(b"ABC")
+    begin = echo.cycle
+    assert echo.run_to_reply(cycles=100_000, quiet_cycles=800)
+    assert echo.serial.peek() == b"BCD"
+    ends = echo.serial.log["end"][echo.serial.log["direction"] == 1]
+    assert 0 <= echo.cycle - (ends[-1] + 800) < 8  # the instruction is finished
+    whole.run(cycles=echo.cycle - begin)
+    assert (whole.serial.peek(), whole.cycle) == (echo.serial.peek(), echo.cycle)
+
+
+def test_without_a_reply_the_wait_ends_in_time(echo):
+    begin = echo.cycle
+    assert not echo.run_to_reply(cycles=5000, quiet_cycles=800)
+    assert 5000 <= echo.cycle - begin < 5008
+    with pytest.raises(UsageError, match="0 and 1 or more"):
+        echo.run_to_reply(cycles=100, quiet_cycles=0)

@@ -27,13 +27,12 @@ def on_the_bench(plan, scene):
         return judge_emulated_arm(plan, judge_pins(plan.segments, line.pins), line.arm)
 
 
-def test_with_sane_limits_the_tip_stays_within_about_a_millimetre_at_every_instant():
-    """Mostly detent torque. Measured: 0.993 mm in `planarm run`, 1.005 mm streamed without allowances as here."""
+def test_with_sane_limits_the_tip_stays_within_a_millimetre_at_every_instant():
     plan = plan_scene(CASE1, quiet)
     arm = on_the_bench(plan, CASE1)
     assert arm.clean, arm.explain()
     assert arm.record.lost_full_steps == (0, 0)
-    assert 0.05 < arm.tip_error_mm.max() < 1.02
+    assert 0.05 < arm.tip_error_mm.max() < 1.0
     assert arm.t_s[-1] > plan.trajectory.duration_s
     assert len(arm.t_s) > 1900 * plan.trajectory.duration_s  # a sample each half millisecond
 

@@ -160,11 +160,11 @@ class SerialPort:
         self._fetch()
         return bytes(self._received)
 
-    def collect(self) -> None:
-        """Fetch the frames that the chip has sent; the board calls this after every run."""
+    def collect(self) -> bool:
+        """Fetch the frames that the chip has sent, and tell whether there were any; the board does after every run."""
         frames = self._chip.drain_tx()
         if len(frames) == 0:
-            return
+            return False
         ends = frames["cycle"]
         self._log.extend(ends - FRAME_BITS * frames["bit_cycles"].astype(np.int64), ends, FROM_BOARD, frames["byte"])
         data = frames["byte"].astype(np.uint8)
@@ -174,9 +174,10 @@ class SerialPort:
             ends = ends[heard]
         if self.bridge is None:
             self._received += data.tobytes()
-            return
+            return True
         for end, byte in zip(ends.tolist(), data.tolist(), strict=True):
             self.bridge.receive(end, byte)
+        return True
 
     def _fetch(self) -> None:
         if self.bridge is not None:

@@ -236,6 +236,24 @@ class Uno:
         length = round(asked)
         self._run_to(self._chip.cycle + length)
 
+    def run_to_reply(self, *, cycles: int, quiet_cycles: int) -> bool:
+        """Let time pass until the board has sent something and been quiet since, but no more than so many cycles.
+
+        Args:
+            cycles: the longest time to wait.
+            quiet_cycles: how long no stop bit has ended on the line, 1 or more.
+
+        Returns:
+            Whether something was sent. A USB bridge may still hold it back; see `serial`.
+
+        Raises:
+            UsageError: a number out of its range.
+            StoppedError: the program came to an end before.
+        """
+        if cycles < 0 or quiet_cycles < 1:
+            raise UsageError(f"run_to_reply was asked for {cycles} cycles, quiet for {quiet_cycles}; 0 and 1 or more")
+        return self._run_to(self._chip.cycle + cycles, tx_quiet=quiet_cycles)
+
     def run_until(
         self, awaited: bytes | Callable[[Uno], bool], *, limit_s: float, every_cycles: int | None = None
     ) -> None:
@@ -459,23 +477,26 @@ class Uno:
         twin.serial.restore(self.serial.snapshot())
         return twin
 
-    def _run_to(self, target: int) -> None:
-        cause = self._chip.run_to(target)
-        self._collect()
+    def _run_to(self, target: int, *, tx_quiet: int = 0) -> bool:
+        """Run as `Chip.run_to` does; tell whether the board has sent something."""
+        cause = self._chip.run_to(target, tx_quiet=tx_quiet)
+        sent = self._collect()
         if cause is not StopCause.REACHED:
             raise StoppedError(
                 f"{self._source}: the program ended at cycle {self.cycle} ({self.time_s:.6f} s): {cause.value}",
                 self.cycle,
                 cause.name,
             )
+        return sent
 
-    def _collect(self) -> None:
-        self.serial.collect()
+    def _collect(self) -> bool:
+        sent = self.serial.collect()
         edges = self._chip.drain_edges()
         if len(edges):
             self._edges.append(edges)
             for listener in self._listeners:
                 listener(edges)
+        return sent
 
     def _recorded(self) -> NDArray[Any]:
         """All recorded edges in one array; joined once, then kept so."""

@@ -117,22 +117,33 @@ class Chip:
         """Cycles of waiting that were not executed one by one (see `idle`), since this object was made."""
         return int(self._state[at.PASSED_OVER])
 
-    def run_to(self, cycle: int) -> StopCause:
+    def run_to(self, cycle: int, *, tx_quiet: int = 0) -> StopCause:
         """Run whole instructions until `self.cycle >= cycle`, or until the program stops earlier.
 
         After BREAK a further call goes on behind it; at an undefined opcode it stops again, with `pc` on it.
+
+        Args:
+            cycle: where to stop.
+            tx_quiet: stop as well (REACHED) once a frame was sent and none has ended for so many cycles; 0: do not.
         """
+        self._state[at.TX_QUIET], self._state[at.STOP_AT] = tx_quiet, at.NEVER
         while True:
-            cause = self._advance(cycle)
-            if cause in _STOPS:
-                return _STOPS[cause]
-            if cause == service.LOG_FULL:
-                self._state = queues.allocate(self._state, queues.contents(self._state))
-            elif cause == service.RESET_WANTED:
-                self._reset_as_asked()
-            else:
-                self._program = execute_spm(self._state, self._program)
-                self._look_at_flash()
+            stop = self._see_to(self._advance(cycle))
+            if stop is not None:
+                return stop
+
+    def _see_to(self, cause: int) -> StopCause | None:
+        """Do what one of `service`'s stops asks for; None when the run goes on."""
+        if cause in _STOPS:
+            return _STOPS[cause]
+        if cause == service.LOG_FULL:
+            self._state = queues.allocate(self._state, queues.contents(self._state))
+        elif cause == service.RESET_WANTED:
+            self._reset_as_asked()
+        else:
+            self._program = execute_spm(self._state, self._program)
+            self._look_at_flash()
+        return None
 
     def _reset_as_asked(self) -> None:
         request = int(self._state[at.RESET_REQUEST])

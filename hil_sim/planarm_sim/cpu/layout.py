@@ -224,8 +224,11 @@ SHIFT_FLAGS = CARRY_FLAGS + 512
     WATCH_STORES,  # STORES then
     WATCH_SRAM,  # 1 when the SRAM is part of the record
     PASSED_OVER,  # cycles, in all
+    # What this run waits for, set anew at each; no snapshot has it either
+    TX_QUIET,  # cycles after the end of a frame sent, in which none follows, that end the run; 0: none do
+    STOP_AT,  # the cycle at which it ends for that
     WATCH_RECORD,  # 38 words
-) = range(SHIFT_FLAGS + 512, SHIFT_FLAGS + 512 + 15)
+) = range(SHIFT_FLAGS + 512, SHIFT_FLAGS + 512 + 17)
 KEPT_SRAM = WATCH_RECORD + 38
 """256 words: the SRAM as it was."""
 

@@ -22,6 +22,7 @@ from planarm_sim.cpu.layout import (
     RESET_REQUEST,
     SOMETHING_CHANGED,
     SREG_BITS,
+    STOP_AT,
     TX_COUNT,
     TX_LIMIT,
     UNKNOWN,
@@ -70,11 +71,12 @@ def service(st: State, memory: Bytes, target: int) -> int:
         due = process_events(st, memory, cycle)
         if st[RESET_REQUEST]:
             return RESET_WANTED
-        if cycle >= target:
+        end = min(target, int(st[STOP_AT]))
+        if cycle >= end:
             return REACHED
         if st[EDGE_COUNT] >= st[EDGE_LIMIT] or st[TX_COUNT] >= st[TX_LIMIT]:
             return LOG_FULL
-        horizon = min(due, target)
+        horizon = min(due, end)
         enabled = st[SREG_BITS] & I
         if enabled:
             pending = pending_interrupts(st)

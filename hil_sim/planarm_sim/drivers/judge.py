@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from planarm_wire.kernel_cache import kernel
+from planarm_sim.cpu.compiled import kernel  # kernel_cache: see there
 
 Ints = NDArray[np.int64]
 Floats = NDArray[np.float64]

@@ -39,7 +39,7 @@ class FaultRunner:
 
     def __init__(self, bench: Bench, schedule: Schedule) -> None:
         self.schedule = schedule
-        self.log: list[str] = []
+        self.log = bench.fault_log
         self._bench = bench
         self._active: tuple[ActiveFault, ...] = ()
         self._before: dict[int, float] = {}

@@ -37,12 +37,14 @@ from planarm_sim.cpu.layout import (
     RX_WAITING,
     RX_WIDTH,
     SOMETHING_CHANGED,
+    STOP_AT,
     TX_BASE,
     TX_BIT_CYCLES,
     TX_BUFFER,
     TX_BUSY,
     TX_COUNT,
     TX_LIMIT,
+    TX_QUIET,
     TX_SHIFT,
     TX_WIDTH,
     State,
@@ -102,6 +104,8 @@ def end_frame(st: State, cycle: int) -> None:
     st[TX_COUNT] = count + 1
     if count + 1 >= st[TX_LIMIT]:
         st[HORIZON] = SOMETHING_CHANGED
+    if st[TX_QUIET]:
+        st[STOP_AT] = cycle + st[TX_QUIET]
     if st[UCSR0A] & UDRE:
         st[TX_BUSY] = 0
         st[DUE_TX] = NEVER

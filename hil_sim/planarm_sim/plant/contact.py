@@ -12,8 +12,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from planarm_sim.cpu.compiled import kernel  # kernel_cache: see there
 from planarm_sim.plant.spec import CircleObstacle, PolygonObstacle
-from planarm_wire.kernel_cache import kernel
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from planarm_sim.cpu.compiled import kernel  # kernel_cache: see there
 from planarm_sim.plant.contact import Obstacles, touch
 from planarm_sim.plant.layout import LEFT, STOPPED, TOUCHED, Body, Floats, State, Work, mark
-from planarm_wire.kernel_cache import kernel
 
 CONTACT_N_M = 5e4
 CONTACT_N_S_M = 60.0

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+from planarm_sim.cpu.compiled import kernel  # kernel_cache: see there
 from planarm_sim.plant.layout import Body, Drive, State, Work
 from planarm_sim.plant.rigid_body import mass_matrix, solve_in_place, substitute
-from planarm_wire.kernel_cache import kernel
 
 FRICTION_SWEEPS = 8
 

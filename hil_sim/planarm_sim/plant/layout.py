@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from planarm_wire.kernel_cache import kernel
+from planarm_sim.cpu.compiled import kernel  # kernel_cache: see there
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

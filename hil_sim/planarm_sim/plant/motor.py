@@ -14,7 +14,7 @@ as soon as their diodes have emptied them. (Acarnley, Stepping Motors, 4th ed., 
 
 from __future__ import annotations
 
-from planarm_wire.kernel_cache import kernel
+from planarm_sim.cpu.compiled import kernel  # kernel_cache: see there
 
 
 @kernel

@@ -21,8 +21,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from planarm_sim.cpu.compiled import kernel  # kernel_cache: see there
 from planarm_sim.plant.spec import Link
-from planarm_wire.kernel_cache import kernel
 
 Floats = NDArray[np.float64]
 

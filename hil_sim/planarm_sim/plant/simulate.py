@@ -10,13 +10,13 @@ from __future__ import annotations
 
 import numpy as np
 
+from planarm_sim.cpu.compiled import kernel  # kernel_cache: see there
 from planarm_sim.plant.contact import Obstacles
 from planarm_sim.plant.forces import push
 from planarm_sim.plant.friction import rub
 from planarm_sim.plant.layout import SLIPPED, SWITCHED, Body, Drive, Floats, Ints, State, Switches, Work, mark
 from planarm_sim.plant.motor import chopped, drained, torque_nm
 from planarm_sim.plant.rigid_body import add_inertia_torques, mass_matrix, solve_in_place
-from planarm_wire.kernel_cache import kernel
 
 
 @kernel
@@ -74,7 +74,8 @@ def advance(
         marked = note_switches(switches, state, cycle, marks, marked)
         if cycle % log_every == 0 and logged < len(log):
             log[logged, 0] = cycle
-            log[logged, 1:] = state.y
+            for i in range(len(state.y)):
+                log[logged, 1 + i] = state.y[i]
             logged += 1
     return logged, marked
 

@@ -161,8 +161,10 @@ def _add_emulate(commands: Commands) -> None:
     command.add_argument(
         "--scene",
         metavar="SCENE",
-        help="whose drivers, motors and arm stand around the board, at its task's start",
+        help="whose drivers, motors and arm stand around the board, at its task's start; default with the released "
+        "firmware: a light arm on a desk",
     )
+    command.add_argument("--bare", action="store_true", help="the board alone, without drivers and arm")
     command.add_argument("--faults", metavar="FILE", help="a schedule of what goes wrong (docs/faults.md)")
     command.add_argument("--fault-seed", type=int, metavar="N", help="in place of the schedule's own seed")
     command.add_argument("--link", metavar="PATH", help="make PATH a link to the pty")

@@ -68,16 +68,22 @@ def build_bench(uno: Uno, setup: ArmSetup) -> tuple[Bench, FaultRunner | None]:
         EmulatorError: a driver has no such micro-steps, or the schedule of faults is none.
     """
     from planarm_sim import Bench, SimError  # noqa: PLC0415 - brings Numba, which only emulation needs
-    from planarm_sim.faults import inject, load_schedule  # noqa: PLC0415
 
     try:
         bench = Bench(uno, rig_of(setup.scene, setup.start_usteps), drivers_of(setup.scene))
     except SimError as error:
         raise EmulatorError(f"{setup.scene.source}: joints.driver, joints.microsteps: {error}") from error
-    if setup.faults is None:
-        return bench, None
+    return bench, _let_loose(bench, setup.faults, setup.fault_seed)
+
+
+def _let_loose(bench: Bench, faults: Path | None, fault_seed: int | None) -> FaultRunner | None:
+    from planarm_sim import SimError  # noqa: PLC0415
+    from planarm_sim.faults import inject, load_schedule  # noqa: PLC0415
+
+    if faults is None:
+        return None
     try:
-        return bench, inject(bench, load_schedule(setup.faults, setup.fault_seed))
+        return inject(bench, load_schedule(faults, fault_seed))
     except SimError as error:
         raise EmulatorError(str(error)) from error
 
@@ -94,6 +100,23 @@ def arm_at_its_start(scene: Scene, faults: Path | None, fault_seed: int | None) 
         raise EmulatorError(f"{scene.source}: task.start_cm: {list(scene.task.start_cm)} is out of the arm's reach")
     usteps = tuple(int(n) for n in np.floor(Transmission.of(scene).usteps(q_rad) + 0.5))
     return lambda uno: build_bench(uno, ArmSetup(scene, usteps, faults, fault_seed))[0]
+
+
+def desk_arm_around(faults: Path | None, fault_seed: int | None) -> Callable[[Uno], Bench]:
+    """Return what puts a light arm around a board that the firmware drives: two A4988 on its pins, 1/16 steps."""
+
+    def put(uno: Uno) -> Bench:
+        from planarm_sim import Bench, DriverWiring, desk_arm, driver_row  # noqa: PLC0415
+
+        row = driver_row("a4988")
+        drivers = [
+            DriverWiring(row, step, direction, ENABLE_PIN) for step, direction in zip(STEP_PINS, DIR_PINS, strict=True)
+        ]
+        bench = Bench(uno, desk_arm(len(drivers)), drivers)
+        _let_loose(bench, faults, fault_seed)
+        return bench
+
+    return put
 
 
 def rig_of(scene: Scene, start_usteps: tuple[int, ...]) -> Rig:

@@ -1,11 +1,13 @@
 """The emulated Uno in this process, as a transport in virtual time. The one place in the host that knows the emulator.
 
-Time passes for the emulator only while the host waits for it: `read` runs the chip in slices until a byte has come out
-or the deadline is reached, so a run is deterministic and as fast as the emulator computes. `Uno.serial` paces bytes at
-the baud rate in both directions, ten bits a byte.
+Time passes for the emulator only while the host waits for it: `read` runs the chip until a reply has come out or the
+deadline is reached, so a run is deterministic and as fast as the emulator computes. `Uno.serial` paces bytes at the
+baud rate in both directions, ten bits a byte.
 """
 
 import math
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -21,7 +23,13 @@ if TYPE_CHECKING:
     from planarm_sim import Bench, Uno
     from planarm_sim.faults import FaultRunner
 
-SLICE_CYCLES = 1600  # a reply is noticed at most 100 us, or 2.5 bytes at 250,000 baud, after it came
+SLICE_CYCLES = 1600
+"""Where the USB bridge or a fault has to be looked after: a byte is noticed at most 100 us after it came."""
+BITS_PER_BYTE = 10
+QUIET_BYTES = 1.25
+"""Else a reply is taken once the line has been quiet for so many byte times; 50 us at 250,000 baud."""
+WAIT_CYCLES = 1_600_000
+"""Longest piece of waiting for a reply, a tenth of a second."""
 
 
 class EmulatorClock:
@@ -72,12 +80,12 @@ class SimTransport:
         self._open = True
 
     def read(self, max_bytes: int, deadline_s: float) -> bytes:
-        """Run the board until it has sent a byte or its time is `deadline_s`; return at most `max_bytes` bytes."""
+        """Run the board until it has sent something or its time is `deadline_s`; return at most `max_bytes` bytes."""
         self._check_open("read")
         uno, line = self.uno, self._machine.serial
         self._received += line.read()
         while not self._received and uno.cycle / TICKS_HZ < deadline_s:
-            _run(self._machine, min(uno.cycle + SLICE_CYCLES, _cycle_after(deadline_s)))
+            self._await_reply(deadline_s)
             self._meet_faults("read")
             self._received += line.read()
         data = bytes(self._received[:max_bytes])
@@ -93,6 +101,17 @@ class SimTransport:
     def close(self) -> None:
         """Stop using the board; its pins stay readable."""
         self._open = False
+
+    def _await_reply(self, deadline_s: float) -> None:
+        """Run to the end of what the board sends next, or a slice where something else may come between."""
+        uno, machine = self.uno, self._machine
+        end = _cycle_after(deadline_s)
+        if self._faults is not None or uno.serial.bridge is not None:
+            _run(machine, min(uno.cycle + SLICE_CYCLES, end))
+            return
+        quiet = round(QUIET_BYTES * BITS_PER_BYTE * TICKS_HZ / uno.serial.baud)
+        with _told_as_link_error():
+            machine.run_to_reply(cycles=int(min(WAIT_CYCLES, end - uno.cycle)), quiet_cycles=quiet)
 
     def _meet_faults(self, action: str) -> None:
         """Do what a schedule of faults does to the host itself: its cable, its processor, its life."""
@@ -133,9 +152,15 @@ def _cycle_after(t_s: float) -> float:
 
 def _run(uno: "Uno | Bench", cycle: float) -> None:
     """Run to `cycle`; an instruction may end a little later."""
+    with _told_as_link_error():
+        uno.run(cycles=max(0, int(cycle) - uno.cycle))
+
+
+@contextmanager
+def _told_as_link_error() -> Iterator[None]:
     from planarm_sim import SimError  # noqa: PLC0415
 
     try:
-        uno.run(cycles=max(0, int(cycle) - uno.cycle))
+        yield
     except SimError as error:
         raise LinkError(f"port sim://: {error}") from error
