@@ -44,7 +44,7 @@ def main() -> None:
 def rates(runs: int, scene: Path, folder: Path) -> Table:
     """Return how many empty runs a second each engine manages by batch, what they weigh and how long joining takes."""
     table = Table(box=box.SIMPLE_HEAD, title=f"{runs:,} runs that do nothing, two workers")
-    for name in ("engine", "batch", "runs/s", "batches/s", "bytes/row, parts", "bytes/row, joined", "read keys s"):
+    for name in ("engine", "batch", "runs/s", "batches/s", "B/row, parts", "joined", "keys s"):
         table.add_column(name, justify="right")
     for name, make in (("processes", local), ("Dask", dask)):
         with make() as engine:
