@@ -151,7 +151,7 @@ def test_an_interrupt_that_held_an_edge_up_is_named(tmp_path):
     path.write_text("\n".join(lines) + "\n")
     capture = open_capture(path)
     report = analyse(capture, map_channels(path, capture.channels, []), schedules_of(train), TimingRules())
-    assert [(f.kind, f.cause) for f in report.findings] == [("late", "interrupt 18")]
+    assert [(f.kind, f.cause) for f in report.findings] == [("late", "interrupt USART_RX")]
 
 
 def test_without_a_plan_only_what_the_lines_show_is_told(tmp_path):

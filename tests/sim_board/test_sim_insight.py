@@ -11,7 +11,8 @@ from hypothesis import strategies as st
 
 from planarm_sim import Uno
 from planarm_sim.errors import UsageError
-from planarm_sim.insight import Spread
+from planarm_sim.insight import INTERVAL, Spread
+from planarm_sim.insight.figures import running_interrupts
 from planarm_sim.loader import Image, Symbol, load_elf
 from sim_chip.avr_assembler import assemble
 
@@ -347,3 +348,9 @@ def test_the_figures_go_into_json(compiled):
     assert written["interrupts"][0]["name"] == "TIMER0_COMPA"
     assert set(written["interrupts"][0]["latency_cycles"]) == {"least", "mean", "p99", "most"}
     assert len(uno.interrupt_intervals()) == 0
+
+
+def test_an_interrupt_within_another_runs_alone_and_the_other_goes_on():
+    rows = [(16, 0, 10, 100, 0), (18, 0, 30, 50, 1), (7, 0, 40, 45, 2), (16, 0, 100, 120, 0)]
+    told = running_interrupts(np.array(rows, dtype=INTERVAL))
+    assert told == [(10, 16), (30, 18), (40, 7), (45, 18), (50, 16), (100, 0), (100, 16), (120, 0)]

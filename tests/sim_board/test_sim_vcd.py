@@ -125,3 +125,14 @@ def test_every_deviation_is_refused_with_its_place(tmp_path: Path, text, words):
     with pytest.raises(TraceError, match=words) as caught:
         read_text(tmp_path, text)
     assert "wave.vcd" in str(caught.value)
+
+
+def test_a_number_stands_in_binary_beside_the_levels(tmp_path: Path):
+    path = tmp_path / "wave.vcd"
+    with VcdWriter(path, ["D9"], [0], numbers=("isr",)) as writer:
+        writer.change(1, 0, 1)
+        writer.number(1, 0, 18)
+        writer.number(2, 0, 0)
+    text = path.read_text()
+    assert '$var wire 8 " isr $end\n' in text
+    assert text.endswith('#625\n1!\nb10010 "\n#1250\nb0 "\n')

@@ -78,3 +78,43 @@ def test_simavrs_recording_is_judged_as_ours(tmp_path):
     assert theirs.timing_error.max_us <= 0.02, "simavr 1.6 writes whole units of 10 ns"
     assert mine.dir_setup_min_us == pytest.approx(theirs.dir_setup_min_us, abs=0.02)
     assert mine.high_min_us == pytest.approx(theirs.high_min_us, abs=0.02)
+
+
+DELAYED = r"""
+#include <avr/interrupt.h>
+#include <avr/io.h>
+#include <util/delay.h>
+ISR(TIMER1_COMPA_vect) { PORTB |= 2; _delay_us(2); PORTB &= ~2; }
+ISR(TIMER2_COMPA_vect) { TIMSK2 = 0; _delay_us(30); }
+int main(void) {
+    DDRB = 0x02;
+    DDRD = 0x10;
+    OCR1A = 1599; TIMSK1 = 2; TCCR1B = 9;  /* a step every 100 us */
+#ifdef LATE
+    OCR2A = 198; TIMSK2 = 2; TCCR2B = 6;   /* once, 199 x 256 cycles later: 16 us before the 32nd step */
+#endif
+    sei();
+    for (;;) {}
+}
+"""
+
+
+@pytest.mark.skipif(shutil.which("avr-gcc") is None, reason="needs avr-gcc")
+def test_the_interrupt_that_held_an_edge_up_is_named_on_the_emulators_own_recording(tmp_path):
+    (tmp_path / "steps.c").write_text(DELAYED)
+    captures = {}
+    for name, flags in {"as_planned": [], "late": ["-DLATE"]}.items():
+        command = ["avr-gcc", "-mmcu=atmega328p", "-DF_CPU=16000000UL", "-O2", *flags, "steps.c", "-o", f"{name}.elf"]
+        subprocess.run(command, cwd=tmp_path, check=True)
+        uno = Uno.from_elf(tmp_path / f"{name}.elf")
+        uno.observe()
+        uno.run(seconds=0.00605)
+        uno.write_vcd(tmp_path / f"{name}.vcd", ["D9", "D4"])
+        captures[name] = open_capture(tmp_path / f"{name}.vcd")
+    channels = {name: map_channels(one.path, one.channels, []) for name, one in captures.items()}
+    schedules = recorded_schedules(captures["as_planned"], channels["as_planned"])
+    report = analyse(captures["late"], channels["late"], schedules, TimingRules((PulseLimits(),), 5.0))
+    [finding] = report.findings
+    assert (finding.kind, finding.cause) == ("late", "interrupt TIMER2_COMPA")
+    assert finding.time_s == pytest.approx(32 * 100e-6, abs=50e-6)
+    assert 10.0 < finding.value_us < 20.0, "30 us of the other interrupt, begun 16 us before the step was due"

@@ -350,6 +350,8 @@ class Uno:
     def write_vcd(self, path: str | Path, names: Sequence[str]) -> None:
         """Write the recorded level changes of some pins as a waveform file.
 
+        Of a program that is watched (`observe`), the line `isr` holds the number of the interrupt that runs, else 0.
+
         Raises:
             PinError: the board has no such pin.
             TraceError: the file cannot be written.
@@ -357,9 +359,25 @@ class Uno:
         signal_of = {pin_place(name).index: number for number, name in enumerate(names)}
         start = dict(zip(PINS, self._log_start_levels, strict=True))
         levels = [start[pin_place(name)] for name in names]
-        with VcdWriter(path, names, levels, self._log_start_cycle) as vcd:
-            vcd.write(self._recorded(), signal_of)
+        edges, running = self._recorded(), self._interrupt_changes()
+        with VcdWriter(path, names, levels, self._log_start_cycle, ("isr",) if self.is_observed else ()) as vcd:
+            done = 0
+            for cycle, vector in running:
+                until = int(np.searchsorted(edges["cycle"], cycle, side="right"))
+                vcd.write(edges[done:until], signal_of)
+                vcd.number(cycle, 0, vector)
+                done = until
+            vcd.write(edges[done:], signal_of)
             vcd.close(self.cycle)
+
+    def _interrupt_changes(self) -> list[tuple[int, int]]:
+        """Return when another interrupt, or none, began to run, and its number, since the recording's start."""
+        if self._observer is None:
+            return []
+        from planarm_sim.insight.figures import running_interrupts  # noqa: PLC0415 - a start need not wait for it
+
+        changes = running_interrupts(self._observer.intervals())
+        return [(cycle, vector) for cycle, vector in changes if cycle >= self._log_start_cycle]
 
     def observe(self, *, symbols: str | Path | None = None, keep_intervals: bool = True) -> None:
         """Watch the program from now on, or anew; see `insight`. The board does the same, a few times slower.

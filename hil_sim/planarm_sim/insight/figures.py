@@ -3,11 +3,21 @@
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass
+from math import inf
 from typing import Any, Final
 
 import numpy as np
+from numpy.typing import NDArray
 
-__all__ = ["INTERVAL", "VECTOR_NAMES", "FunctionFigures", "Insight", "InterruptFigures", "Spread"]
+__all__ = [
+    "INTERVAL",
+    "VECTOR_NAMES",
+    "FunctionFigures",
+    "Insight",
+    "InterruptFigures",
+    "Spread",
+    "running_interrupts",
+]
 
 VECTOR_NAMES: Final = (
     "RESET", "INT0", "INT1", "PCINT0", "PCINT1", "PCINT2", "WDT", "TIMER2_COMPA", "TIMER2_COMPB", "TIMER2_OVF",
@@ -123,3 +133,25 @@ class Insight:
     def as_dict(self) -> dict[str, Any]:
         """All of it for JSON, the two shares included."""
         return {**asdict(self), "load": self.load, "interrupt_share": self.interrupt_share}
+
+
+def running_interrupts(intervals: NDArray[Any]) -> list[tuple[int, int]]:
+    """Return the moments at which another interrupt began to run, with its number; 0 where none runs.
+
+    Args:
+        intervals: INTERVAL in order of entries; one within another interrupts it, which then goes on.
+    """
+    changes: list[tuple[int, int]] = []
+    stack: list[tuple[int, int]] = []
+
+    def end_before(cycle: float) -> None:
+        while stack and stack[-1][1] <= cycle:
+            _, end = stack.pop()
+            changes.append((end, stack[-1][0] if stack else 0))
+
+    for vector, entry, end in intervals[["vector", "entry", "exit"]].tolist():
+        end_before(entry)
+        stack.append((vector, end))
+        changes.append((entry, vector))
+    end_before(inf)
+    return changes

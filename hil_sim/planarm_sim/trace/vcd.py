@@ -46,30 +46,42 @@ class VcdWriter:
         signals: names, in the order of the indices that `change` takes.
         levels: their levels at `cycle`.
         cycle: moment at which the recording starts.
+        numbers: names of signals of eight bits, 0 at the start, which `number` changes; they come after the others.
 
     Raises:
         TraceError: the file cannot be written, or the names are empty, repeated or hold white space.
     """
 
-    def __init__(self, path: str | Path, signals: Sequence[str], levels: Sequence[int], cycle: int = 0) -> None:
+    def __init__(
+        self,
+        path: str | Path,
+        signals: Sequence[str],
+        levels: Sequence[int],
+        cycle: int = 0,
+        numbers: Sequence[str] = (),
+    ) -> None:
         if not signals or len(set(signals)) != len(signals) or any(not n or n.split() != [n] for n in signals):
             raise TraceError(f"{path}: signal names must be given, differ and hold no white space: {list(signals)}")
         if len(levels) != len(signals):
             raise TraceError(f"{path}: {len(levels)} levels for {len(signals)} signals")
         self._path = path
-        self._codes = [_code(index) for index in range(len(signals))]
+        self._codes = [_code(index) for index in range(len(signals) + len(numbers))]
+        self._first_number = len(signals)
         self._cycle = cycle
         try:
             self._file: IO[str] = Path(path).open("w", encoding="ascii", newline="\n")  # noqa: SIM115 - closed in close()
         except OSError as error:
             raise TraceError(f"{path}: cannot be written: {error.strerror}") from error
-        self._write_header(signals, levels)
+        self._write_header(signals, levels, numbers)
 
-    def _write_header(self, signals: Sequence[str], levels: Sequence[int]) -> None:
+    def _write_header(self, signals: Sequence[str], levels: Sequence[int], numbers: Sequence[str]) -> None:
+        widths = [1] * len(signals) + [8] * len(numbers)
         variables = "".join(
-            f"$var wire 1 {code} {name} $end\n" for code, name in zip(self._codes, signals, strict=True)
+            f"$var wire {width} {code} {name} $end\n"
+            for width, code, name in zip(widths, self._codes, (*signals, *numbers), strict=True)
         )
-        initial = "".join(f"{level}{code}\n" for code, level in zip(self._codes, levels, strict=True))
+        values = [str(level) for level in levels] + ["b0 "] * len(numbers)
+        initial = "".join(f"{value}{code}\n" for code, value in zip(self._codes, values, strict=True))
         self._file.write(
             f"$comment {UNITS_PER_CYCLE} time units are one cycle of a 16 MHz clock $end\n"
             f"$timescale {TIMESCALE} $end\n$scope module uno $end\n{variables}$upscope $end\n$enddefinitions $end\n"
@@ -85,6 +97,16 @@ class VcdWriter:
         if cycle != self._cycle:
             self._advance(cycle)
         self._file.write(f"{level}{self._codes[signal]}\n")
+
+    def number(self, cycle: int, number: int, value: int) -> None:
+        """Write that a signal of eight bits, counted among its kind, has a value from a cycle on.
+
+        Raises:
+            TraceError: `cycle` lies before the latest one written.
+        """
+        if cycle != self._cycle:
+            self._advance(cycle)
+        self._file.write(f"b{value:b} {self._codes[self._first_number + number]}\n")
 
     def write(self, edges: NDArray[Any], signal_of: Mapping[int, int]) -> None:
         """Write recorded edges in order of time.
