@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from time import perf_counter
 
 import numpy as np
 
 from planarm.errors import NoPathError, SceneError
 from planarm.model.arm import Arm
+from planarm.roadmap.planning import RoadmapTask, joint_route_of
 from planarm.scene import JointSpaceSpec, Scene
 from planarm.search.diagnosis import Diagnosis, diagnose, diagnose_joints
 from planarm.search.grid_search import find_path
@@ -43,13 +45,16 @@ def find_route(scene: Scene, margin_cm: float) -> Route:
     """Search as the scene says, and smooth.
 
     Args:
-        scene: what to do; with a table [joint_space] in joint space, else in tip space on each allowed elbow side.
+        scene: what to do; with a planner on a roadmap there, with a table [joint_space] in joint space, else in tip
+            space on each allowed elbow side.
         margin_cm: least distance of a link's centre line to an obstacle.
 
     Raises:
         SceneError, NoPathError: there is no path; the message, `advice` and `fields` say why and what would help.
         TimingError: the path meets full stretch or fold, and no motion near it can be proved free.
     """
+    if scene.planner.on_roadmap:
+        return roadmap_route(scene, margin_cm)
     return joint_route(scene, margin_cm, scene.joint_space) if scene.joint_space else tip_route(scene, margin_cm)
 
 
@@ -79,6 +84,21 @@ def joint_route(scene: Scene, margin_cm: float, spec: JointSpaceSpec) -> Route:
     if result.route is None:
         raise no_path(scene, diagnose_joints(scene, margin_cm, result))
     return smoothed_joint_route(scene, margin_cm, result.route, result.plan_s)
+
+
+def roadmap_route(scene: Scene, margin_cm: float, task: RoadmapTask | None = None) -> Route:
+    """Return the route along the cheapest way on the scene's roadmap, or on a known one; errors as `find_route`."""
+    if len(scene.arm.link_lengths_cm) != 2:
+        links = len(scene.arm.link_lengths_cm)
+        problem = f"{links} links are searched (docs/mpdstar.md), but motions are made for 2"
+        raise SceneError(scene.source, "arm.link_lengths_cm", problem)
+    task = task or RoadmapTask.of(scene, margin_cm)
+    began_s = perf_counter()
+    answer = task.planner.solve()
+    search_s = perf_counter() - began_s
+    if answer.status is not SearchStatus.FOUND:
+        raise task.no_way(scene)
+    return smoothed_joint_route(scene, margin_cm, joint_route_of(scene, task.roadmap, answer), search_s)
 
 
 def smoothed_joint_route(scene: Scene, margin_cm: float, found: JointRoute, search_s: float) -> Route:

@@ -98,6 +98,7 @@ ALLOWED: dict[str, set[str]] = {
         "planarm.model",
         "planarm.workspace",
         "planarm.search",
+        "planarm.roadmap",
         "planarm.smoothing",
     },
     "planarm.alternatives": {
@@ -205,6 +206,8 @@ ALLOWED: dict[str, set[str]] = {
         "planarm.model",
         "planarm.workspace",
         "planarm.search",
+        "planarm.dynamics",
+        "planarm.roadmap",
         "planarm.smoothing",
         "planarm.trajectory",
         "planarm.report",

@@ -11,6 +11,7 @@ from planarm.model.collision import pose_clearance_cm
 from planarm.model.shapes import Circle, Polygon, obstacle_set, shape_of
 from planarm.roadmap.graph import KINDS, Roadmap
 from planarm.roadmap.moves import are_free, nearest_pairs
+from planarm.roadmap.recheck import all_ends_cm, touched_moves
 from planarm.roadmap.sampling import free_poses
 from planarm.roadmap.swept import SweptCells
 from planarm.scene import parse_scene
@@ -151,6 +152,21 @@ def test_the_index_finds_every_move_that_an_obstacle_touches(links, sized):
             ours, theirs = indexed.remove_obstacle(ours[0]), all_checked.remove_obstacle(theirs[0])
             assert sorted(ours.edges.tolist()) == sorted(theirs.edges.tolist())
     assert looked < 0.5 * sized(40, 1000) * len(indexed.pairs)
+
+
+@pytest.mark.parametrize("links", [2, 4])
+def test_the_recheck_of_one_obstacle_judges_as_every_other_proof_of_moves(links, sized):
+    roadmap, rng = roadmap_of(links), np.random.default_rng(11)
+    every = np.arange(len(roadmap.pairs))
+    ends = all_ends_cm(roadmap.world, roadmap.poses_rad)
+    touched_once = 0
+    for _ in range(sized(30, 500)):
+        alone, margin = obstacle_set([random_shape(rng)]), float(rng.uniform(0.5, 3.0))
+        world = roadmap.world._replace(obstacles=alone, margin_cm=margin)
+        touched = touched_moves(roadmap.world, alone, margin, roadmap.poses_rad, ends, roadmap.pairs, every)
+        assert set(touched) == set(np.flatnonzero(~are_free(world, roadmap.poses_rad, roadmap.pairs, every)))
+        touched_once += len(touched) > 0
+    assert touched_once > 10
 
 
 def test_what_two_obstacles_block_opens_when_both_are_gone():

@@ -15,10 +15,10 @@ def ready():
     kernels = {id(k): k for m in modules for k in vars(m).values() if isinstance(k, CPUDispatcher)}
     return {(k.__name__, str(signature)) for k in kernels.values() for signature in k.overloads}
 
-warm_up()
+warm_up(on_roadmap=True)
 before = ready()
-for case in (1, 2):
-    plan_scene(load_scene(f"examples/table1_case{case}.toml"), lambda stage, share: None)
+for name in ("table1_case1", "table1_case2", "energy_two_links"):
+    plan_scene(load_scene(f"examples/{name}.toml"), lambda stage, share: None)
 assert len(before) > 10, before
 print(sorted(ready() - before))
 """

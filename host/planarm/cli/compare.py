@@ -1,4 +1,4 @@
-"""`planarm compare table2`: a paper's table, computed anew; `--external CMD`: a planner on the open benchmark."""
+"""`planarm compare table2|mpdstar`: a paper's tables, computed anew; `--external CMD`: a planner on the benchmark."""
 
 from __future__ import annotations
 
@@ -21,13 +21,19 @@ if TYPE_CHECKING:
     from planarm.experiments.text_table import TextTable
 
 
+BENCHMARK_SCENES = 1000
+SAVING_SCENES = 60
+
+
 def execute(options: argparse.Namespace) -> int:
     """Compute the comparison, print it, and write it down where --out says."""
     if (options.table is None) == (options.external is None):
-        raise UsageError("give table2, or --external CMD")
+        raise UsageError("give table2 or mpdstar, or --external CMD")
     compile_first("planarm")
     if options.external is not None:
         return _external(options)
+    if options.table == "mpdstar":
+        return _mpdstar(options)
     return _as_printed(options) if options.as_printed else _table2(options)
 
 
@@ -36,11 +42,36 @@ def _external(options: argparse.Namespace) -> int:
     from planarm.experiments.external import score_external, score_table
 
     with progress(options.json) as notice:
-        score = score_external(options.external, options.scenes, options.timeout_s, notice)
+        score = score_external(options.external, options.scenes or BENCHMARK_SCENES, options.timeout_s, notice)
     if options.json:
         print(json.dumps(score.fields()))
     else:
         terminal().print(_shown(score_table(score)))
+    return 0
+
+
+def _mpdstar(options: argparse.Namespace) -> int:
+    from planarm.experiments.mpdstar import as_json, compare_mpdstar, findings, tables, write_mpdstar
+    from planarm.experiments.mpdstar_scenes import ASSUMPTIONS
+
+    out = Path(options.out) if options.out else None
+    if out:
+        with writing(out):  # before the work is done
+            out.mkdir(parents=True, exist_ok=True)
+    with progress(options.json) as notice:
+        result = compare_mpdstar(options.nodes, options.scenes or SAVING_SCENES, notice)
+        if out:
+            with writing(out):
+                write_mpdstar(result, out, notice)
+    if options.json:
+        print(json.dumps(as_json(result)))
+        return 0
+    _print_sentences(terminal(), "What is assumed", ASSUMPTIONS)
+    for one in tables(result):
+        terminal().print(_shown(one))
+    _print_sentences(terminal(), "What is reproduced, and what is not", findings(result))
+    if out:
+        terminal().print(f"mpdstar.json, mpdstar.md and pictures: {out}", markup=False)
     return 0
 
 

@@ -55,7 +55,7 @@ def execute(options: argparse.Namespace) -> int:
 
         with progress(options.json) as notice:
             notice("kernels", 0.0)
-            warm_up()
+            warm_up(on_roadmap=scene.planner.on_roadmap)
             notice("kernels", 1.0)
             notice("payload", 0.0)
             told["payload_kg"] = asdict(largest_payload_kg(one, certify))

@@ -183,12 +183,13 @@ def _add_emulate(commands: Commands) -> None:
 def _add_compare(commands: Commands) -> None:
     command = commands.add_parser("compare", help="compute a paper's table anew beside the published one")
     command.add_argument(
-        "table", nargs="?", choices=("table2",), help="table2: A*, Modified A*, Chaos A* and CHS, two cases"
+        "table", nargs="?", choices=("table2", "mpdstar"), help="table2: paper C's planners; mpdstar: paper A's"
     )
     command.add_argument("--external", metavar="CMD", help="score a planner of yours on the open benchmark instead")
     command.add_argument(
-        "--scenes", type=_count, default=1000, metavar="N", help="scenes of the benchmark (default: all)"
+        "--scenes", type=_count, metavar="N", help="scenes of the benchmark (all), or random ones of mpdstar (60)"
     )
+    command.add_argument("--nodes", type=_count, default=100_000, metavar="N", help="largest graph of mpdstar (100000)")
     command.add_argument("--timeout-s", type=float, default=60.0, metavar="S", help="longest wait for an answer")
     command.add_argument("--out", metavar="DIR", help="folder for table2.json, table2.md and pictures")
     command.add_argument(

@@ -44,7 +44,7 @@ def execute(options: argparse.Namespace) -> int:
     require_place(target)
     with progress(options.json) as notice:
         notice("kernels", 0.0)
-        warm_up()
+        warm_up(on_roadmap=scene.planner.on_roadmap)
         notice("kernels", 1.0)
         plan = plan_scene(scene, notice)
     save_plan(stored(plan), target)

@@ -16,6 +16,7 @@ from planarm.dynamics.energy import CONSUMED, NET, PEAK_SPEED, TIME, TRAVEL, Edg
 from planarm.dynamics.rigid_body import RigidBody, potential_energy_j
 from planarm.model.shapes import Circle, Polygon, obstacle_set
 from planarm.roadmap.moves import are_free, nearest_pairs
+from planarm.roadmap.recheck import all_ends_cm, touched_moves
 from planarm.roadmap.sampling import free_poses
 from planarm.roadmap.swept import SweptCells
 from planarm.scene import EdgeCost, Scene
@@ -57,6 +58,7 @@ class Roadmap:
         self.graph: Digraph = _directed(len(poses_rad), self.pairs)
         self._base: Floats = self.graph.cost.copy()
         """Costs without added obstacles, not a number where not asked for yet."""
+        self._ends_cm = all_ends_cm(world, poses_rad)
         self._blockers: Ints = np.zeros(len(self.pairs), np.int64)
         self._blocked_by: dict[int, Ints] = {}
         self._added = 0
@@ -140,10 +142,9 @@ class Roadmap:
         self._swept = self._swept or SweptCells.of(self.world, self.poses_rad, self.pairs)
 
     def _block(self, shape: Circle | Polygon, tolerance_cm: float, moves: Ints) -> tuple[int, Changes]:
-        world = self.world._replace(
-            obstacles=obstacle_set([shape]), margin_cm=self.world.margin_cm + tolerance_cm, floor=False
-        )
-        touched = moves[~are_free(world, self.poses_rad, self.pairs, moves)]
+        margin = self.world.margin_cm + tolerance_cm
+        obstacle = obstacle_set([shape])
+        touched = touched_moves(self.world, obstacle, margin, self.poses_rad, self._ends_cm, self.pairs, moves)
         self._blockers[touched] += 1
         self._added += 1
         self._blocked_by[self._added] = touched

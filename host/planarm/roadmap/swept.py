@@ -1,8 +1,8 @@
 """Which moves can an obstacle touch? A grid over the workspace that lists, for each cell, the moves that sweep it.
 
 A move is cut into pieces on which no point of the arm leaves the middle pose by more than half a cell. There each link
-is a chain of points half a cell apart, and every cell that a disc around a point meets is listed: discs of a quarter of
-a cell and the piece's bound cover all that the link's centre line sweeps. An obstacle touches at most the moves of the
+is a chain of points a cell apart, and every cell that a disc around a point meets is listed: discs of half a cell and
+the piece's bound cover all that the link's centre line sweeps. An obstacle touches at most the moves of the
 cells that come as near to it as the margin.
 """
 
@@ -88,7 +88,7 @@ def list_cells(world: JointWorld, poses_rad: Floats, pairs: Ints, grid: Grid, at
                 q[j] = a[j] + (p + 0.5) / pieces * (b[j] - a[j])
             link_ends(world, q, ends)
             for k in range(joints):
-                dots = max(1, ceil(world.lengths_cm[k] / (0.5 * cell)))
+                dots = max(1, ceil(world.lengths_cm[k] / cell))
                 radius = 0.5 * world.lengths_cm[k] / dots + full[k] / pieces + 1e-9
                 for d in range(dots):
                     share = (d + 0.5) / dots

@@ -49,9 +49,10 @@ class JointRoute:
 
     poses_rad: Floats
     """Shape (n, 2), n >= 1, from start to goal; straight moves between them are proved free."""
-    objective: JointObjective
+    objective: str
+    """What is least, in words."""
     cost: float
-    """Sum over the moves in the objective's unit (rad, s or cm), changes of the elbow's side included."""
+    """Sum over the moves in the objective's unit (rad, s, cm or J), changes of the elbow's side included."""
     bound: float
     """What any way between these two poses costs at least: the straight move's cost, or the tip's straight line."""
     joint_travel_rad: float
@@ -183,10 +184,16 @@ def _ends_problem(
 
 
 def _route(scene: Scene, world: JointWorld, costs: Costs, spec: JointSpaceSpec, poses: Floats) -> JointRoute:
-    moves = list(pairwise(poses))
+    cost = sum(move_cost(world, costs, *a, *b) for a, b in pairwise(poses))
+    return made_route(scene, poses, spec.objective, cost, least_cost(world, costs, *poses[0], *poses[-1]))
+
+
+def made_route(scene: Scene, poses: Floats, objective: str, cost: float, bound: float) -> JointRoute:
+    """Return a way through poses of shape (n, 2), and what is told of it."""
+    speeds = np.array([joint.max_speed_rad_s for joint in scene.joints])
     tips = tip_points_cm(scene, poses)
     changes = []
-    for a, b in moves:
+    for a, b in pairwise(poses):
         if (a[1] < 0.0) != (b[1] < 0.0):
             straight = a + (b - a) * (a[1] / (a[1] - b[1]))
             x, y = forward(Arm.from_spec(scene.arm), straight)[-1]
@@ -195,11 +202,11 @@ def _route(scene: Scene, world: JointWorld, costs: Costs, spec: JointSpaceSpec, 
     turns = np.abs(np.diff(poses, axis=0))
     return JointRoute(
         poses_rad=poses,
-        objective=spec.objective,
-        cost=sum(move_cost(world, costs, *a, *b) for a, b in moves),
-        bound=least_cost(world, costs, *poses[0], *poses[-1]),
+        objective=objective,
+        cost=cost,
+        bound=bound,
         joint_travel_rad=float(np.hypot(*turns.T).sum()),
-        time_s=float((turns / costs.speeds_rad_s).max(axis=1, initial=0.0).sum()),
+        time_s=float((turns / speeds).max(axis=1, initial=0.0).sum()),
         tip_length_cm=float(np.hypot(*np.diff(tips, axis=0).T).sum()),
         changes_cm=tuple(changes),
         sides=("up" if poses[0][1] < 0.0 else "down", "up" if poses[-1][1] < 0.0 else "down"),

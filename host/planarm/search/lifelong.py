@@ -11,6 +11,10 @@ wrong answers on walks (docs/errata.md). MPD* Lite (paper A, Fig. 6) stores with
 path is then read off, where D* Lite compares all successors of each of its nodes; and where a cost rises, or a node's
 g, only nodes whose stored successor is concerned are looked at again, where D* Lite compares numbers.
 
+A node's rhs that may have risen is not computed at once. While g and rhs were equal its key is that of g whatever rhs
+becomes, so the node is marked, waits with that key, and compares its successors when its turn comes: often never, and
+once where several of them rise one after another.
+
 All searches go from the goal towards the start, over edges into the expanded node. An edge whose cost is not known
 stops them; they return the node whose incoming costs they need and go on from there when called again.
 """
@@ -26,6 +30,7 @@ from planarm_wire.kernel_cache import kernel
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
+Flags = NDArray[np.bool_]
 
 DONE = -1
 """A search has ended; any number from 0 on is a node whose incoming costs are needed."""
@@ -47,6 +52,8 @@ class Lifelong(NamedTuple):
     rhs: Floats
     best: Ints
     """The successor that gives rhs, -1 where there is none; kept only when `stores` is true."""
+    stale: Flags
+    """True for nodes whose rhs is infinite, or that of some successors only, until their turn comes."""
     heap: Heap
     key_modifier: Floats
     """k_m, shape (1,)."""
@@ -64,6 +71,7 @@ def new_lifelong(nodes: int, start: int, goal: int, *, stores: bool) -> Lifelong
         g=np.full(nodes, np.inf),
         rhs=np.full(nodes, np.inf),
         best=np.full(nodes, -1, np.int64),
+        stale=np.zeros(nodes, np.bool_),
         heap=new_heap(nodes),
         key_modifier=np.zeros(1),
         ends=np.array([start, start, goal]),
@@ -80,6 +88,9 @@ def repair(graph: Digraph, bounds: Bounds, state: Lifelong) -> int:
     """Expand nodes until the start's distance is right; return DONE, or the node whose incoming costs are needed."""
     g, rhs, heap = state.g, state.rhs, state.heap
     start = state.ends[START]
+    if state.stale[start]:
+        _compare_all(graph, state, start)
+        _update(bounds, state, start)
     while heap.size[0] > 0:
         u = heap.nodes[0]
         first, second = heap.keys[u, 0], heap.keys[u, 1]
@@ -90,6 +101,9 @@ def repair(graph: Digraph, bounds: Bounds, state: Lifelong) -> int:
         now_first = now_second + bound(bounds, start, u) + state.key_modifier[0]
         if first < now_first or (first == now_first and second < now_second):
             put(heap, u, now_first, now_second)
+        elif state.stale[u]:
+            _compare_all(graph, state, u)
+            _update(bounds, state, u)
         elif g[u] > rhs[u]:
             if lacks(graph, u):
                 return int(u)
@@ -120,8 +134,7 @@ def change(graph: Digraph, bounds: Bounds, state: Lifelong, edges: Ints, costs: 
             continue
         if new > old:
             if (state.best[u] == v) if state.stores else (rhs[u] == old + g[v] and rhs[u] < np.inf):
-                _compare_all(graph, state, u)
-                _update(bounds, state, u)
+                _forget(graph, bounds, state, u)
         elif new + g[v] < rhs[u]:
             rhs[u], state.best[u] = new + g[v], v
             _update(bounds, state, u)
@@ -158,9 +171,18 @@ def _tell_higher(graph: Digraph, bounds: Bounds, state: Lifelong, u: int, before
         p = graph.tail[e]
         told = (state.best[p] == u) if state.stores else (rhs[p] == graph.cost[e] + before and rhs[p] < np.inf)
         if told and p != state.ends[GOAL]:
-            _compare_all(graph, state, p)
-            _update(bounds, state, p)
+            _forget(graph, bounds, state, p)
     state.counted[LOOKED] += graph.in_first[u + 1] - graph.in_first[u]
+
+
+@kernel
+def _forget(graph: Digraph, bounds: Bounds, state: Lifelong, u: int) -> None:
+    """Let rhs of u be found anew: at once where its key depends on it, else when its turn comes."""
+    if state.g[u] == state.rhs[u] and u != state.ends[START]:
+        state.rhs[u], state.best[u], state.stale[u] = np.inf, -1, True
+    else:
+        _compare_all(graph, state, u)
+    _update(bounds, state, u)
 
 
 @kernel
@@ -175,7 +197,7 @@ def _compare_all(graph: Digraph, state: Lifelong, u: int) -> None:
         v = graph.head[e]
         if state.g[v] < np.inf and graph.cost[e] + state.g[v] < least:
             least, best = graph.cost[e] + state.g[v], v
-    state.rhs[u], state.best[u] = least, best
+    state.rhs[u], state.best[u], state.stale[u] = least, best, False
     state.counted[RESCANNED] += 1
     state.counted[LOOKED] += graph.out_first[u + 1] - graph.out_first[u]
 

@@ -1,0 +1,193 @@
+"""`./dev bench mpdstar`: one new obstacle on a roadmap: what is checked again, repaired, or planned anew.
+
+Two links among four obstacles, 10,000 configurations, energy consumed as cost, everything warm and all costs known.
+Each trial draws two configurations that a way of ten moves or more joins, and puts an obstacle where neither of them
+stands. "ours" asks the index which moves it can touch, checks those, tells the search and solves; "anew" checks every
+move against it and searches by A*. The times are of one core; compare the ratios.
+"""
+
+# ruff: noqa: T201 - it prints its results
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable
+from time import perf_counter
+
+import numpy as np
+from numpy.typing import NDArray
+
+from planarm.experiments.mpdstar_scenes import bench_scene
+from planarm.model.shapes import Circle, obstacle_set
+from planarm.roadmap.graph import Roadmap
+from planarm.search.incremental import Changes, GraphAlgorithm, GraphAnswer, GraphPlanner
+from planarm.search.result import SearchStatus
+from planarm.workspace.joint_proof import link_ends, pose_spare_cm
+
+Floats = NDArray[np.float64]
+
+LEAST_MOVES = 10
+DIAMETERS_CM = (2.0, 4.0, 8.0)
+FIFTHS = 5
+
+
+class Bench:
+    """A roadmap, and pairs of its nodes that are worth a plan."""
+
+    def __init__(self, nodes: int, cost: str, seed: int) -> None:
+        scene = bench_scene(nodes, cost)
+        self.roadmap = Roadmap.of(scene, scene.margin_cm)
+        self.roadmap.prepare()
+        self.roadmap.cost_all()
+        self.bounds = self.roadmap.bounds()
+        self.rng = np.random.default_rng(seed)
+
+    def planner(self, algorithm: GraphAlgorithm, ends: tuple[int, int], *, always_repair: bool = False) -> GraphPlanner:
+        """Return a planner that has not searched yet."""
+        return GraphPlanner(self.roadmap.graph, self.bounds, ends, algorithm, always_repair=always_repair)
+
+    def task(self) -> tuple[tuple[int, int], GraphAnswer]:
+        """Return two nodes and the way between them."""
+        while True:
+            start, goal = (int(n) for n in self.rng.integers(0, len(self.roadmap.poses_rad), 2))
+            found = self.planner("roadmap_a_star", (start, goal)).solve()
+            if len(found.nodes) > LEAST_MOVES:
+                return (start, goal), found
+
+    def tip_cm(self, node: int) -> tuple[float, float]:
+        """Return where a node has the tip."""
+        ends = np.empty((3, 2))
+        link_ends(self.roadmap.world, self.roadmap.poses_rad[node], ends)
+        return float(ends[-1, 0]), float(ends[-1, 1])
+
+    def obstacle(self, nodes: NDArray[np.int64], diameter_cm: float, place: int | None) -> Circle | None:
+        """Return an obstacle near the tip in one fifth of the way, or anywhere; None when it touches start or goal."""
+        if place is None:
+            x, y = self.rng.uniform(-50.0, 50.0, 2)
+        else:
+            low, high = (max(1, round(share * (len(nodes) - 1) / FIFTHS)) for share in (place, place + 1))
+            x, y = np.array(self.tip_cm(int(nodes[self.rng.integers(low, max(low + 1, high))])))
+        shape = Circle((float(x), float(y)), 0.5 * diameter_cm)
+        alone = self.roadmap.world._replace(obstacles=obstacle_set([shape]))
+        clear = all(pose_spare_cm(alone, self.roadmap.poses_rad[node]) > 0.0 for node in nodes[[0, -1]])
+        return shape if clear else None
+
+    def undo(self, number: int, planner: GraphPlanner | None = None) -> None:
+        """Take an obstacle away."""
+        changes = self.roadmap.remove_obstacle(number)
+        if planner is None:
+            self.roadmap.graph.cost[changes.edges] = changes.costs
+        else:
+            planner.change(changes)
+
+
+def one_trial(bench: Bench, diameter_cm: float, place: int | None) -> dict[str, float] | None:
+    """Return the times in milliseconds of one new obstacle, ours and anew."""
+    ends, first = bench.task()
+    shape = bench.obstacle(first.nodes, diameter_cm, place)
+    if shape is None:
+        return None
+    ours, forced = bench.planner("mpd_star_lite", ends), bench.planner("mpd_star_lite", ends, always_repair=True)
+    ours.solve()
+    forced.solve()
+    graph = bench.roadmap.graph
+
+    began = perf_counter()
+    number, changes = bench.roadmap.add_obstacle(shape)
+    checked = perf_counter()
+    before = graph.cost[changes.edges]
+    taken = perf_counter()
+    ours.change(changes)
+    answer = ours.solve()
+    ended = perf_counter()
+    check_ms, search_ms = 1e3 * (checked - began), 1e3 * (ended - taken)
+
+    graph.cost[changes.edges] = before
+    repair_ms, repaired = timed(lambda: change_and_solve(forced, changes))
+    bench.undo(number)
+
+    began = perf_counter()
+    number, changes = bench.roadmap.add_checking_all(shape)
+    graph.cost[changes.edges] = changes.costs
+    all_ms = 1e3 * (perf_counter() - began)
+    anew = bench.planner("roadmap_a_star", ends)
+    anew_ms, other = timed(anew.solve)
+    bench.undo(number)
+    if answer.status is not other.status or not np.isclose(answer.cost, other.cost, rtol=1e-9, equal_nan=True):
+        raise AssertionError(f"ours costs {answer.cost}, A* {other.cost}")
+    return {
+        "check": check_ms,
+        "total": check_ms + search_ms,
+        "chosen": search_ms,
+        "repair": repair_ms,
+        "anew": anew_ms,
+        "all": all_ms,
+        "edges": float(len(changes.edges)),
+        "repair_expanded": float(repaired.work.expanded),
+        "anew_expanded": float(other.work.expanded),
+        "was_anew": float(answer.anew),
+        "found": float(answer.status is SearchStatus.FOUND),
+        "rerouted": float(not np.isclose(answer.cost, first.cost)),
+    }
+
+
+def change_and_solve(planner: GraphPlanner, changes: Changes) -> GraphAnswer:
+    """Tell a planner what changed, and let it solve."""
+    planner.change(changes)
+    return planner.solve()
+
+
+def timed(work: Callable[[], GraphAnswer]) -> tuple[float, GraphAnswer]:
+    """Return milliseconds and result."""
+    began = perf_counter()
+    result = work()
+    return 1e3 * (perf_counter() - began), result
+
+
+def trials(bench: Bench, count: int, diameter_cm: float, place: int | None) -> dict[str, Floats]:
+    """Return the figures of so many trials."""
+    rows: list[dict[str, float]] = []
+    while len(rows) < count:
+        row = one_trial(bench, diameter_cm, place)
+        if row is not None:
+            rows.append(row)
+    return {key: np.array([row[key] for row in rows]) for key in rows[0]}
+
+
+def report(name: str, t: dict[str, Floats]) -> None:
+    """Print one line of the table."""
+    ratio = (t["all"] + t["anew"]) / t["total"]
+    search = t["anew"] / t["repair"]
+    chosen = t["anew"] / t["chosen"]
+    print(
+        f"{name:34s} {np.median(t['total']):6.2f} {np.percentile(t['total'], 95):6.2f} {np.median(t['check']):6.2f}"
+        f" {np.percentile(ratio, 5):6.1f} {np.median(ratio):6.1f} | {np.median(t['repair']):6.2f}"
+        f" {np.median(t['anew']):6.2f} {np.median(search):7.2f} {np.mean(search < 1.0):5.0%} |"
+        f" {np.median(chosen):7.2f} {np.mean(t['was_anew']):5.0%} {np.mean(t['rerouted']):5.0%}"
+    )
+
+
+def main() -> None:
+    """Measure and print."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--nodes", type=int, default=10_000)
+    parser.add_argument("--trials", type=int, default=100)
+    parser.add_argument("--cost", default="consumed")
+    parser.add_argument("--seed", type=int, default=1)
+    options = parser.parse_args()
+    trials(Bench(200, options.cost, 7), 3, 4.0, None)  # compiled, or loaded
+    bench = Bench(options.nodes, options.cost, options.seed)
+    trials(bench, 3, 4.0, None)
+    print(f"{options.nodes} configurations, {len(bench.roadmap.pairs)} moves, cost {options.cost}; ms, of one core")
+    print(
+        f"{'new obstacle':34s}   ours    p95  check  x anew: p5, med | repair  A*anew  A*/rep A*wins |"
+        "  A*/chosen  anew  rerouted"
+    )
+    report("4 cm, anywhere", trials(bench, 2 * options.trials, 4.0, None))
+    for diameter in DIAMETERS_CM:
+        for place in range(FIFTHS):
+            report(f"{diameter:g} cm, fifth {place + 1} of the way", trials(bench, options.trials, diameter, place))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,117 @@
+"""Planning on a roadmap as a scene says: its ends as configurations, the search, and the way that it finds."""
+
+from dataclasses import dataclass
+from itertools import pairwise, product
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from planarm.dynamics.energy import edge_energy
+from planarm.errors import NoPathError, SceneError
+from planarm.model.arm import Arm
+from planarm.model.kinematics import ElbowSide, inverse_2r
+from planarm.roadmap.graph import Roadmap
+from planarm.scene import EdgeCost, Point, Scene
+from planarm.search.digraph import bound
+from planarm.search.incremental import GraphAlgorithm, GraphAnswer, GraphPlanner
+from planarm.search.joint_space import JointRoute, made_route
+from planarm.workspace.joint_proof import JointWorld, joint_world, pose_spare_cm
+from planarm.workspace.world import elbow_sides
+
+Floats = NDArray[np.float64]
+
+OBJECTIVES: Final[dict[EdgeCost, str]] = {
+    "consumed": "energy consumed",
+    "net": "net energy",
+    "stepper": "steppers' energy",
+    "time": "time from node to node",
+    "travel": "joint travel",
+}
+
+START, GOAL = 0, 1
+"""The nodes of a scene's ends."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RoadmapTask:
+    """A roadmap whose first two nodes are a scene's start and goal, and the planner on it."""
+
+    roadmap: Roadmap
+    planner: GraphPlanner
+
+    @classmethod
+    def of(cls, scene: Scene, margin_cm: float) -> "RoadmapTask":
+        """Return what the scene describes; nothing is searched yet.
+
+        Raises:
+            SceneError: no allowed pose at start or goal is free.
+            NoPathError: hardly any configuration is free.
+        """
+        ends = ends_rad(scene, joint_world(scene, margin_cm))
+        roadmap = Roadmap.of(scene, margin_cm, ends)
+        algorithm: GraphAlgorithm = scene.planner.algorithm  # type: ignore[assignment] # scenes on a roadmap name these
+        planner = GraphPlanner(roadmap.graph, roadmap.bounds(), (START, GOAL), algorithm, roadmap.cost_into)
+        return cls(roadmap, planner)
+
+    def no_way(self, scene: Scene) -> NoPathError:
+        """Return the error that tells that nothing joins start and goal."""
+        roadmap = self.roadmap
+        error = NoPathError(
+            f"{scene.source}: no way on the roadmap joins start and goal: {len(roadmap.poses_rad)} configurations, "
+            f"{len(roadmap.pairs)} free moves, {roadmap.world.margin_cm:.4g} cm kept"
+        )
+        error.advice = ("Raise roadmap.nodes or planner.neighbours; another planner.seed draws other configurations.",)
+        return error
+
+
+def joint_route_of(scene: Scene, roadmap: Roadmap, answer: GraphAnswer) -> JointRoute:
+    """Return a way of two links on a roadmap as a way in joint space."""
+    poses = roadmap.poses_rad[answer.nodes]
+    bounded = bound(roadmap.bounds(), int(answer.nodes[0]), int(answer.nodes[-1]))
+    return made_route(scene, poses, OBJECTIVES[roadmap.cost], answer.cost, bounded)
+
+
+def ends_rad(scene: Scene, world: JointWorld) -> tuple[Floats, Floats]:
+    """Return start and goal as configurations, each of shape (n,), free.
+
+    A point of two links has a pose on each elbow side that the scene allows; of all pairs that are free the one with
+    the least joint travel is taken.
+
+    Raises:
+        SceneError: no pose at an end is free.
+    """
+    task = scene.task
+    choices: list[list[Floats]] = []
+    for name, point, angles in (("start", task.start_cm, task.start_rad), ("goal", task.goal_cm, task.goal_rad)):
+        poses = _poses_at(scene, point) if angles is None else [np.array(angles)]
+        free = [pose for pose in poses if pose_spare_cm(world, pose) > 0.0]
+        if not free:
+            key = f"task.{name}_{'cm' if angles is None else 'deg'}"
+            spare = max((pose_spare_cm(world, pose) for pose in poses), default=None)
+            near = (
+                f"a link's centre line is nearer than {world.margin_cm:.4g} cm to an obstacle or the floor, by "
+                f"{-spare:.3f} cm at the least; move one of them"
+                if spare is not None
+                else "is out of reach or of arm.joint_limits_deg on the elbow side that arm.elbow allows"
+            )
+            raise SceneError(scene.source, key, near)
+        choices.append(free)
+    pairs = [(start, goal) for start, goal in product(*choices)]
+    return min(pairs, key=lambda pair: float(np.linalg.norm(pair[1] - pair[0])))
+
+
+def _poses_at(scene: Scene, point_cm: Point) -> list[Floats]:
+    """Return the poses of two links with the tip at a point, within the joints' limits."""
+    arm = Arm.from_spec(scene.arm)
+    sides: tuple[ElbowSide, ...] = elbow_sides(scene.arm)
+    low, high = np.array(arm.joint_limits_rad).T
+    poses = [inverse_2r(arm, point_cm, side) for side in sides]
+    return [pose for pose in poses if np.isfinite(pose).all() and (pose >= low).all() and (pose <= high).all()]
+
+
+def way_energy_j(roadmap: Roadmap, nodes: NDArray[np.int64]) -> Floats:
+    """Return the energy consumed on a way by each joint, in joules, shape (n,), resting at every node."""
+    poses = roadmap.poses_rad[nodes]
+    joints = poses.shape[1]
+    return sum((edge_energy(roadmap.model, a, b)[0] for a, b in pairwise(poses)), np.zeros(joints))
