@@ -375,6 +375,9 @@ class ModelLine:
     def clock(self) -> "ModelLine":
         return self
 
+    def nonce(self) -> int:
+        return self._chance.getrandbits(32)
+
     def now_s(self) -> float:
         return self.events.now_s
 

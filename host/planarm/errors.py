@@ -8,6 +8,7 @@
     ├── EmulatorError     E203  the emulator cannot start: image, link or file
     ├── OutputError       E204  a file or folder cannot be written
     ├── PlanFileError     E205  the file is no plan, or cannot be read
+    ├── JournalError      E207  a run's journal is damaged, or is none
     ├── CaptureError      E206  the recording of the pins cannot be read, or does not show what is asked
     ├── NoPathError       E301  start and goal are fine, but no collision-free path joins them
     ├── TimingError       E401  the path cannot be timed within the joints' limits
@@ -93,6 +94,13 @@ class PlanFileError(PlanarmError):
 
     exit_code: ClassVar[int] = 2
     code: ClassVar[str] = "E205"
+
+
+class JournalError(PlanarmError):
+    """What was given as a run has no journal, or it cannot be read."""
+
+    exit_code: ClassVar[int] = 2
+    code: ClassVar[str] = "E207"
 
 
 class CaptureError(PlanarmError):

@@ -8,7 +8,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from contextlib import closing
-from dataclasses import asdict, replace
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -27,12 +27,10 @@ from planarm.errors import (
 )
 from planarm.fastest.task import fastest_path
 from planarm.link.arm_record import ArmSetup, ArmTrace
-from planarm.link.exchange import StreamResult, stream_plan
-from planarm.link.stream import StreamOptions, StreamProgress
+from planarm.link.stream import StreamProgress
 from planarm.link.transport import PinTrace, Transport, open_transport
 from planarm.model.arm import Arm
 from planarm.model.kinematics import forward
-from planarm.model.transmission import motor_axes
 from planarm.plan import Findings, Plan
 from planarm.plan_file import StoredPlan
 from planarm.record.outcome import Outcome, Seen, StreamLog
@@ -40,12 +38,12 @@ from planarm.route import find_route
 from planarm.run_folder import begin_run_folder, finish_run_folder
 from planarm.scene import Scene
 from planarm.search.path import Path as TipPath
-from planarm.stepping.certify import Certificate, certify
+from planarm.stepping.certify import certify
 from planarm.stepping.quantise import quantisation_bound_cm
 from planarm.stepping.schedule import schedule
 from planarm.stepping.segments import SegmentPlan, expand
 from planarm.stepping.slowing import SpeedLimit
-from planarm.stepping.windows import start_stop_ticks
+from planarm.streaming import options_for, record, stream
 from planarm.summary import planned_figures, seen_figures, summarise
 from planarm.trajectory.binding import report_timing
 from planarm.trajectory.limits import Limits
@@ -183,9 +181,10 @@ def run_scene(
     setup = ArmSetup(scene, plan.segments.start_usteps, faults, fault_seed)
     with closing(open_transport(port, scene.link.baud, setup)) as transport:
         log = StreamLog(transport.clock.now_s)
-        intervals = tuple(start_stop_ticks(axis) for axis in motor_axes(scene.joints, scene.coupling))
+        recorded = record(transport, out, port, scene)
+        options = options_for(scene, plan.segments)
         try:
-            streamed = stream(plan.segments, plan.certificate, transport, notice, intervals, log.note)
+            streamed = stream(plan.segments, plan.certificate, recorded, telling(notice, log.note), options)
         except (LinkError, DeviceFault, HostKilledError, CertificateError, StepsDifferError) as error:
             seen = look_at(plan, transport, SETTLE_AFTER_FAILURE_S)
             for line in seen.notes() if log.samples else ():
@@ -201,39 +200,6 @@ def run_scene(
     if seen.arm and not seen.arm.clean:
         raise StepsDifferError(f"{scene.source}: {seen.arm.explain()}; see {out}")
     return summary
-
-
-def stream(
-    plan: SegmentPlan,
-    certificate: Certificate,
-    transport: Transport,
-    notice: Notice,
-    intervals_ticks: tuple[int, ...] = (),
-    watch: Callable[[StreamProgress], None] | None = None,
-) -> StreamResult:
-    """Stream a certified plan and wait until the device has executed it.
-
-    `intervals_ticks` are the motors' at their start-stop speeds; without them the device takes its default.
-    `watch` is told everything that the device tells.
-
-    Raises:
-        CertificateError: The certificate is red; nothing is sent.
-        LinkError: The line or its protocol failed.
-        DeviceFault: The firmware latched a fault.
-        StepsDifferError: The device's ledger is not the plan.
-    """
-    if not certificate.ok:
-        raise CertificateError(certificate.explain())
-    # The need is not told: a fast arm's stop takes more road than the queue holds, and the device would run slowly.
-    allowances = tuple(replace(allowance, need_ticks=0.0) for allowance in plan.allowances)
-    options = StreamOptions(allowances=allowances, start_stop_ticks=intervals_ticks)
-
-    def tell(told: StreamProgress) -> None:
-        notice("stream", told.path_s / told.total_s)
-        if watch is not None:
-            watch(told)
-
-    return stream_plan(transport, plan.segments, tell, options)
 
 
 def judge_pins(plan: SegmentPlan, trace: PinTrace) -> Findings:
@@ -256,6 +222,17 @@ def look_at(plan: Plan, transport: Transport, settle_s: float) -> Seen:
     arm = judge_emulated_arm(plan, findings, transport.arm) if transport.arm else None
     planned = [joint.ticks for joint in expand(plan.segments).steps]
     return Seen(transport.pins, findings, arm, start_tick_of(planned, [joint.ticks for joint in findings.measured]))
+
+
+def telling(notice: Notice, watch: Callable[[StreamProgress], None] | None = None) -> Callable[[StreamProgress], None]:
+    """Return what tells a stream's progress as the share of its path time, and all of it to `watch`."""
+
+    def tell(told: StreamProgress) -> None:
+        notice("stream", told.path_s / told.total_s)
+        if watch is not None:
+            watch(told)
+
+    return tell
 
 
 def judge_emulated_arm(plan: Plan, findings: Findings, trace: ArmTrace) -> ArmFindings:

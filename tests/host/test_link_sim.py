@@ -10,9 +10,10 @@ from link_echo import write_echo_image
 from link_model import motion
 from planarm.errors import LinkError
 from planarm.link.exchange import stream_plan
+from planarm.link.plan_steps import planned_usteps
 from planarm.link.position import Certainty, StreamError, StreamFault
 from planarm.link.sim_transport import SimTransport
-from planarm.link.stream import StreamOptions, planned_usteps
+from planarm.link.stream import StreamOptions
 from planarm.link.transport import Transport, open_transport
 from planarm_wire.messages import DIR_PINS, ENABLE_PIN, HOST_WINDOW_BYTES, STEP_PINS, Move, Segment
 from planarm_wire.steps import direction, duration_ticks, step_ticks
@@ -113,7 +114,7 @@ class NoisyLine:
 
     def __init__(self, line: SimTransport, chance: random.Random, probability: float) -> None:
         self._line, self._chance, self._probability = line, chance, probability
-        self.clock, self.pins = line.clock, line.pins
+        self.clock, self.pins, self.nonce = line.clock, line.pins, line.nonce
 
     def _damage(self, data: bytes) -> bytes:
         out = bytearray()

@@ -10,9 +10,10 @@ from hypothesis import strategies as st
 from link_model import USB_FLUSH_S, Damage, ModelLine, motion
 from planarm.errors import CertificateError, DeviceFault, LinkError, StepsDifferError
 from planarm.link.exchange import open_session, request, stream_plan
+from planarm.link.plan_steps import planned_usteps
 from planarm.link.position import Certainty, StreamError, StreamFault
 from planarm.link.session import SessionLimits
-from planarm.link.stream import StreamOptions, planned_usteps
+from planarm.link.stream import StreamOptions
 from planarm_wire.codec import decode, encoded_bytes
 from planarm_wire.framing import Frame, FrameDecoder, encode_frame
 from planarm_wire.messages import (
@@ -270,7 +271,7 @@ def test_the_keyboard_holds_first_and_stops_second():
             if len(held) == 20:
                 raise KeyboardInterrupt
 
-    with pytest.raises(StreamError, match=r"stopped by the keyboard.*position exact") as stopped:
+    with pytest.raises(StreamError, match=r"stopped as asked.*position exact") as stopped:
         stream_plan(line, plan, press)
     executed = line.device.segments_executed
     assert 40 <= len(executed) < len(plan)

@@ -7,11 +7,12 @@ import pytest
 
 from planarm.cli.main import main
 from planarm.errors import CertificateError
-from planarm.pipeline import plan_scene, stored, stream
+from planarm.pipeline import plan_scene, stored
 from planarm.plan_file import arm_hash, load_plan, require_arm, save_plan
 from planarm.report.tables import certificate_table
 from planarm.scene import parse_scene
 from planarm.stepping.certificate import Certificate
+from planarm.streaming import stream
 from planarm.warm_up import SMALL_SCENE
 
 
@@ -64,7 +65,7 @@ def test_nothing_is_sent_of_a_plan_without_certificate_or_with_a_red_one(plan, r
     first, *others = plan.certificate.checks
     certificate = Certificate((replace(first, verdict="red"), *others) if red else ())
     with pytest.raises(CertificateError, match=r"wire limits|no checks"):
-        stream(plan.segments, certificate, NoLine(), lambda _stage, _share: None)
+        stream(plan.segments, certificate, NoLine(), None)
 
 
 def test_the_table_shows_every_check_and_what_to_change(plan):

@@ -30,6 +30,7 @@ class FakeLine:
         self.waits: list[float] = []
         self.most_taken = 0
         self.baud_set: int | None = None
+        self.dtr_stays_up = False
 
     def _catch_up(self) -> None:
         while self.acts and self.acts[0][0] <= self.clock.time_s - self.start_s:
@@ -52,6 +53,9 @@ class FakeLine:
 
     def baud(self) -> int | None:
         return self.baud_set
+
+    def keeps_dtr(self) -> bool:
+        return self.dtr_stays_up
 
     def read(self, most: int) -> bytes:
         self._catch_up()

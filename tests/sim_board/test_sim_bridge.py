@@ -112,6 +112,13 @@ def test_opening_resets_the_board_as_a_uno_does():
     assert rig.bridge.counts.lost_bytes == len(POWER_UP), "sent before anyone had opened"
 
 
+def test_a_host_that_leaves_dtr_up_resets_the_board_only_once():
+    rig = Rig([(0.05, "open"), (0.1, "close"), (0.15, "open"), (0.16, b"a")], boot_s=0.1)
+    rig.line.dtr_stays_up = True
+    rig.bridge.run(0.5)
+    assert rig.line.text == RESET + b"b", "the second opening finds it running"
+
+
 def test_closing_and_opening_at_once_is_an_opening():
     rig = Rig([(0.05, "open"), (0.1, "close"), (0.1, "open")])
     rig.bridge.run(seconds=0.2)

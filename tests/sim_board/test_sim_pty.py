@@ -2,6 +2,7 @@
 
 import os
 import sys
+import termios
 from pathlib import Path
 
 import pytest
@@ -92,6 +93,17 @@ def test_the_last_bytes_of_a_host_are_there_after_it_has_closed():
         assert line.is_open()
         assert line.read(2) == b"e"
         assert not line.is_open()
+
+
+def test_what_becomes_of_dtr_at_closing_is_a_setting_that_stays():
+    with PtyLine() as line:
+        for kept in (True, False):
+            fd = os.open(line.path, os.O_RDWR | os.O_NOCTTY)
+            settings = termios.tcgetattr(fd)
+            settings[2] = settings[2] & ~termios.HUPCL if kept else settings[2] | termios.HUPCL
+            termios.tcsetattr(fd, termios.TCSANOW, settings)
+            os.close(fd)
+            assert line.keeps_dtr() is kept
 
 
 def test_nothing_to_read_is_no_bytes():

@@ -9,8 +9,9 @@ import pytest
 
 from planarm.link.arm_record import ArmSetup
 from planarm.link.transport import open_transport
-from planarm.pipeline import judge_emulated_arm, judge_pins, plan_scene, stream
+from planarm.pipeline import judge_emulated_arm, judge_pins, plan_scene
 from planarm.scene import load_scene
+from planarm.streaming import stream
 
 CASE1 = load_scene(Path(__file__).resolve().parents[2] / "examples" / "table1_case1.toml")
 BELT = ((1.0, 0.0), (1.0, 1.0))
@@ -23,7 +24,7 @@ def quiet(_stage, _share):
 def on_the_bench(plan, scene):
     """Stream the plan to the arm of a scene; what the arm did."""
     with closing(open_transport("sim://", 250_000, ArmSetup(scene, plan.segments.start_usteps))) as line:
-        stream(plan.segments, plan.certificate, line, quiet)
+        stream(plan.segments, plan.certificate, line, None)
         return judge_emulated_arm(plan, judge_pins(plan.segments, line.pins), line.arm)
 
 

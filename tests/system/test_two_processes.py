@@ -9,6 +9,8 @@ from pathlib import Path
 
 import pytest
 
+from planarm.plan_file import load_plan
+from planarm.stepping.expand import expand
 from planarm_sim.trace import read_vcd
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -47,6 +49,44 @@ def test_run_streams_through_a_pty_to_the_emulator(tmp_path):
     assert not link.exists(), "the emulator takes its link away"
     assert count_rises(trace, "D9") == summary["steps_planned"][0]
     assert count_rises(trace, "D10") == summary["steps_planned"][1]
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="DTR stays up by a setting that Linux keeps with the port")
+def test_a_killed_run_is_resumed_by_another_process_and_no_step_is_lost(tmp_path):
+    """SIGKILL in the middle: the board comes to rest on the path, and the second program finds it where it is."""
+    link, trace = tmp_path / "uno", tmp_path / "trace.vcd"
+    emulator = subprocess.Popen(
+        command("emulate", "--link", str(link), "--vcd", str(trace)), stdout=subprocess.PIPE, text=True, cwd=tmp_path
+    )
+    try:
+        emulator.stdout.readline()
+        words = ("run", str(ROOT / "examples/table1_case1.toml"), "--port", str(link), "--out", "out")
+        with subprocess.Popen(command(*words), stderr=subprocess.PIPE, text=True, cwd=tmp_path) as run:
+            said = []
+            for line in run.stderr:
+                said.append(line)
+                if line.startswith("stream: 25 %"):
+                    run.kill()
+                    break
+            assert said[-1].startswith("stream: 25 %"), said
+        resumed = subprocess.run(
+            command("resume", "out", "--json"),
+            capture_output=True,
+            text=True,
+            cwd=tmp_path,
+            timeout=LIMIT_S,
+            check=False,
+        )
+    finally:
+        emulator.send_signal(signal.SIGINT)
+        rest = emulator.communicate(timeout=LIMIT_S)[0]
+    assert resumed.returncode == 0, resumed.stderr
+    verdict = json.loads(resumed.stdout)
+    assert verdict["verdict"] == "exact", verdict
+    assert 0 < verdict["executed_segments"][0] < verdict["total_segments"]
+    assert emulator.returncode == 0, rest
+    planned = expand(load_plan(tmp_path / "out" / "run.plan").segments)
+    assert [count_rises(trace, pin) for pin in ("D9", "D10")] == [len(joint.ticks) for joint in planned.steps]
 
 
 def count_rises(trace, pin):

@@ -11,11 +11,12 @@ import struct
 import sys
 from typing import Final
 
-__all__ = ["get_baud", "set_baud"]
+__all__ = ["get_baud", "keeps_dtr", "set_baud"]
 
 TERMIOS2: Final = struct.Struct("4IB19s2I")
 TCGETS2, TCSETS2 = 0x802C542A, 0x402C542B
 CBAUD, BOTHER = 0o010017, 0o010000
+HUPCL = 0o002000
 KNOWN: Final = sys.platform == "linux" and platform.machine() in ("x86_64", "i686", "aarch64", "armv7l", "riscv64")
 
 
@@ -24,6 +25,13 @@ def get_baud(fd: int) -> int | None:
     if not KNOWN:
         return None
     return int(TERMIOS2.unpack(_ioctl(fd, TCGETS2, bytes(TERMIOS2.size)))[-1])
+
+
+def keeps_dtr(fd: int) -> bool:
+    """Whether the terminal `fd` would leave DTR up when its last user closes it (HUPCL is off); False if unknown."""
+    if not KNOWN:
+        return False
+    return not int(TERMIOS2.unpack(_ioctl(fd, TCGETS2, bytes(TERMIOS2.size)))[2]) & HUPCL
 
 
 def set_baud(fd: int, baud: int) -> None:

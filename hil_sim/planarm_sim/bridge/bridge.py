@@ -79,7 +79,8 @@ class Bridge:
         speed: see the module's text.
         follow_baud: take the rate that the host sets, as the board's USB bridge does.
         boot_s: seconds by the clock for which the board stays in reset when a host opens the line, as a Uno does (its
-            DTR line resets it); what the host sends meanwhile is lost. None: opening changes nothing.
+            DTR line resets it), unless the host before left DTR up; what the host sends meanwhile is lost. None:
+            opening changes nothing.
         say: takes notices for the user, one line each.
         after_run: called after every piece of emulated time, to carry recorded edges away.
     """
@@ -108,6 +109,7 @@ class Bridge:
         self._say = say
         self._after_run = after_run
         self._is_open = False
+        self._dtr_stayed_up = False
         self._opened = self._from_host = self._to_host = self._lost = 0
         self._lag_given_up_s = 0.0
         self._quiet_from_cycle = 0
@@ -155,9 +157,11 @@ class Bridge:
             self._opened += 1
             self._lost += len(self._uno.serial.read()) + len(self._undelivered)  # nobody was there
             self._undelivered = b""
-            if self._boot_s is not None:
+            if self._boot_s is not None and not self._dtr_stayed_up:
                 self._reset(self._boot_s)
         self._is_open = self._line.is_open()
+        if self._is_open:
+            self._dtr_stayed_up = self._line.keeps_dtr()
         if self._follow_baud and self._is_open:
             self._set_baud(self._line.baud())
 

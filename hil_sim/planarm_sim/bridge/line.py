@@ -39,6 +39,10 @@ class Line(Protocol):
         """Rate that the host has set, bits a second; None where that cannot be told."""
         ...
 
+    def keeps_dtr(self) -> bool:
+        """Tell whether the host's system leaves DTR up when the host closes the line."""
+        ...
+
     def read(self, most: int) -> bytes:
         """Take up to `most` bytes that the host sent; b"" when there are none now."""
         ...

@@ -16,7 +16,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Self
 
-from planarm_sim.bridge.baud import get_baud, set_baud
+from planarm_sim.bridge.baud import get_baud, keeps_dtr, set_baud
 from planarm_sim.bridge.open_watch import watch_opening
 from planarm_sim.errors import BridgeError
 
@@ -80,6 +80,10 @@ class PtyLine:
     def baud(self) -> int | None:
         """Rate that the host has set, bits a second; None where the system does not tell."""
         return get_baud(self._fd)
+
+    def keeps_dtr(self) -> bool:
+        """Tell whether DTR would stay up when the host closes the terminal; it has no such line, but the setting."""
+        return keeps_dtr(self._fd)
 
     def read(self, most: int) -> bytes:
         """Take up to `most` bytes that the host sent; b"" when there are none, or when it has closed."""

@@ -87,6 +87,7 @@ def build_parser() -> argparse.ArgumentParser:
     _add_plan(commands)
     _add_run(commands)
     _add_stream(commands)
+    _add_resume(commands)
     _add_envelope(commands)
     _add_emulate(commands)
     _add_compare(commands)
@@ -141,6 +142,22 @@ def _add_stream(commands: Commands) -> None:
     command.add_argument("plan", metavar="FILE.plan")
     command.add_argument("--arm", metavar="SCENE", help="the arm that is connected: a plan for another one is refused")
     _add_port(command)
+    command.add_argument("--out", metavar="DIR", help="folder for plan and journal (out/NAME)")
+    _add_json(command)
+
+
+def _add_resume(commands: Commands) -> None:
+    command = commands.add_parser(
+        "resume",
+        help="go on with a run that broke off",
+        description="Tell how well the arm's position is known after a run that broke off: exact, bounded (+-n steps)\n"
+        "or lost. From an exact position the rest of the path is executed, from a bounded one after a yes.",
+        epilog=EXIT_CODES,
+    )
+    command.add_argument("run", metavar="RUN", help="the run's folder")
+    _add_port(command)
+    command.add_argument("--check", action="store_true", help="only tell the verdict")
+    command.add_argument("--yes", action="store_true", help="go on from a bounded position, too")
     _add_json(command)
 
 

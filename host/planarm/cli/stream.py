@@ -16,18 +16,24 @@ def execute(options: argparse.Namespace) -> int:
     tell_first_compile("planarm", "planarm_sim")
     from planarm.link.position import moved_usteps
     from planarm.link.transport import open_transport
-    from planarm.pipeline import stream
+    from planarm.pipeline import telling
     from planarm.plan_file import load_plan, require_arm
+    from planarm.run_folder import begin_run_folder
     from planarm.scene import load_scene
+    from planarm.scene.rebuild import scene_from_mapping
+    from planarm.streaming import options_for, record, stream
 
     plan = load_plan(Path(options.plan))
     if options.arm is not None:
         require_arm(plan, load_scene(Path(options.arm)), options.plan)
-    link = plan.scene["link"]
-    port = link["port"] if options.port is None else options.port
-    with progress(options.json) as notice, closing(open_transport(port, link["baud"])) as transport:
-        result = stream(plan.segments, plan.certificate, transport, notice)
+    scene = scene_from_mapping(plan.scene)
+    port = scene.link.port if options.port is None else options.port
+    out = Path(options.out) if options.out else Path("out") / Path(options.plan).stem
+    begin_run_folder(out, plan)
+    with progress(options.json) as notice, closing(open_transport(port, scene.link.baud)) as transport:
+        line = record(transport, out, port, scene)
+        result = stream(plan.segments, plan.certificate, line, telling(notice), options_for(scene, plan.segments))
     moved = moved_usteps(result.ledger_before, result.ledger_after)
-    told = {"moved_usteps": list(moved), "retransmissions": result.retransmissions}
+    told = {"moved_usteps": list(moved), "retransmissions": result.retransmissions, "run": str(out)}
     print(json.dumps(told) if options.json else f"executed {told['moved_usteps']} micro-steps")
     return 0

@@ -5,14 +5,14 @@
 `stream_plan` carries out a whole plan; `open_session` and `request` serve commands that only ask or switch something.
 """
 
-import secrets
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from planarm.errors import DeviceFault, LinkError
-from planarm.link.position import Certainty, PositionReport, StreamError, StreamFault, moved_usteps
+from planarm.link.knock import ask_expected
+from planarm.link.position import Known, Meeting, PositionReport, StreamError, StreamFault, judge
 from planarm.link.session import Session, SessionLimits, fault_words
-from planarm.link.stream import Phase, Stream, StreamOptions, StreamProgress
+from planarm.link.stream import Joining, Phase, Stream, StreamOptions, StreamProgress
 from planarm.link.transport import Transport
 from planarm_wire.messages import Fault, HostMessage, Ledger, Query, Segment, State, Status
 
@@ -20,6 +20,8 @@ _READ_BYTES = 4096
 _REST_LIMIT_S = 5.0
 _REST_POLL_S = 0.02
 _FOREVER_S = float("inf")
+_MOVING = (State.RUNNING, State.HOLDING, State.STOPPING)
+"""What is queued goes on by itself, and then the device rests."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,6 +58,8 @@ def stream_plan(
     on_progress: Callable[[StreamProgress], None] | None = None,
     options: StreamOptions | None = None,
     limits: SessionLimits | None = None,
+    joining: Joining | None = None,
+    steer: Callable[[Stream], None] | None = None,
 ) -> StreamResult:
     """Open a session, execute `segments` and check the device's ledger against them.
 
@@ -64,7 +68,9 @@ def stream_plan(
     CertificateError when `segments` are no whole motion. Stream errors carry a `position`. Without segments the arm is
     where it should be: the device is asked for its ledger, and nothing is enabled. Ctrl-C during a motion is a hold:
     the arm slows down and rests on the path. A second Ctrl-C is a stop: the rest of the plan is dropped, and a
-    StreamError tells the position. A third does not wait for that.
+    StreamError tells the position. A third does not wait for that. With `joining` the device has begun the motion and
+    holds a part of it; the rest is sent. `steer` is handed the stream at every pass while it runs: it may call its
+    `hold`, `resume`, `override` and `stop`.
     """
     began_s = transport.clock.now_s()
     if not segments:
@@ -72,9 +78,9 @@ def stream_plan(
         request(transport, session, Query())
         return _result(session, transport.clock.now_s(), began_s)
     session = _new_session(transport, limits)
-    stream = Stream(session, segments, options, on_progress)
+    stream = Stream(session, segments, options, on_progress, joining)
     try:
-        _drive_with_keyboard(transport, session, stream)
+        _drive_with_keyboard(transport, session, stream, steer)
     except KeyboardInterrupt as stop:
         if stream.ledger_before is None:
             raise
@@ -89,17 +95,18 @@ def stream_plan(
         cause = fault_words(fault) if fault is not Fault.NONE else str(error)  # a refusal may foretell a fault
         raise StreamFault(cause, position) from error
     if stream.stopped:
-        assert session.status is not None, "a stop is seen in a status"
-        raise StreamError("stopped by the keyboard", _report(Certainty.EXACT, session.status, stream))
+        raise StreamError("stopped as asked", _report(stream, session, _meeting(session)))
     return _result(session, transport.clock.now_s(), began_s, stream)
 
 
-def _drive_with_keyboard(transport: Transport, session: Session, stream: Stream) -> None:
+def _drive_with_keyboard(
+    transport: Transport, session: Session, stream: Stream, steer: Callable[[Stream], None] | None
+) -> None:
     """Carry the plan out; the first Ctrl-C in motion holds, the second stops, the third is raised."""
     answers = [stream.hold, stream.stop]
     while True:
         try:
-            return _drive(transport, session, lambda: stream.done, stream)
+            return _drive(transport, session, lambda: stream.done, stream, steer)
         except KeyboardInterrupt:
             if stream.phase is not Phase.RUNNING or not answers:
                 raise
@@ -122,10 +129,16 @@ def request(transport: Transport, session: Session, message: HostMessage) -> Sta
 
 
 def _new_session(transport: Transport, limits: SessionLimits | None) -> Session:
-    return Session(secrets.randbits(32), transport.clock.now_s(), limits)
+    return Session(transport.nonce(), transport.clock.now_s(), limits)
 
 
-def _drive(transport: Transport, session: Session, is_done: Callable[[], bool], stream: Stream | None = None) -> None:
+def _drive(
+    transport: Transport,
+    session: Session,
+    is_done: Callable[[], bool],
+    stream: Stream | None = None,
+    steer: Callable[[Stream], None] | None = None,
+) -> None:
     """Pass bytes and time until `is_done`.
 
     What has arrived is read before the time is looked at, so that a host that was held up blames nobody for it.
@@ -135,6 +148,8 @@ def _drive(transport: Transport, session: Session, is_done: Callable[[], bool], 
         now_s = clock.now_s()
         session.on_time(now_s)
         if stream is not None:
+            if steer is not None and stream.phase is Phase.RUNNING:
+                steer(stream)
             stream.advance(now_s)
         output = session.take_output()
         if output:
@@ -145,46 +160,53 @@ def _drive(transport: Transport, session: Session, is_done: Callable[[], bool], 
         session.receive(transport.read(_READ_BYTES, deadline_s), clock.now_s())
 
 
+def meet(transport: Transport, next_seq: int, limits: SessionLimits | None = None) -> Meeting:
+    """Meet a device again after a break: first how far it got, for the journal, then who it is and where it rests.
+
+    Args:
+        transport: the line.
+        next_seq: the number that the next frame of the session that broke off would have had.
+        limits: how long to wait.
+
+    Raises:
+        LinkError: it does not answer.
+        DeviceFault: it refuses.
+    """
+    ask_expected(transport, next_seq, limits)
+    session = open_session(transport, limits)
+    clock = transport.clock
+    limit_s = clock.now_s() + _REST_LIMIT_S
+    while request(transport, session, Query()).state in _MOVING and clock.now_s() < limit_s:
+        clock.wait_until(clock.now_s() + _REST_POLL_S)
+    return _meeting(session)
+
+
 def _find_position(transport: Transport, session: Session, stream: Stream) -> tuple[PositionReport, Fault]:
     """Find out where the arm is after a motion broke off, and the fault that latched, if any.
 
     The device is asked again, unless it has just told.
     """
-    last = session.status
-    assert last is not None and session.welcome is not None, "a motion begins with a status"
-    if last.state is State.FAULT:
-        return _report(Certainty.EXACT, last, stream), last.fault
+    assert session.status is not None, "a motion begins with a status"
+    if session.status.state is State.FAULT:
+        return _report(stream, session, _meeting(session)), session.status.fault
     try:
-        fresh = open_session(transport, session.limits)
-        assert fresh.welcome is not None, "an open session has a welcome"
-        if fresh.welcome.boot_nonce != session.welcome.boot_nonce:
-            return _report(Certainty.LOST, last, stream), Fault.NONE
-        last = _wait_for_rest(transport, fresh)
+        met = meet(transport, session.next_seq, session.limits)
     except (LinkError, DeviceFault):
-        return _report(Certainty.BOUNDED, last, stream), Fault.NONE
-    certainty = {State.RUNNING: Certainty.BOUNDED, State.IDLE: Certainty.LOST}.get(last.state, Certainty.EXACT)
-    return _report(certainty, last, stream), last.fault
+        return _report(stream, session, None), Fault.NONE
+    return _report(stream, session, met), met.status.fault
 
 
-def _wait_for_rest(transport: Transport, session: Session) -> Status:
-    """Return the first status that is not running, or the last after the limit; what is queued goes on by itself."""
-    clock = transport.clock
-    limit_s = clock.now_s() + _REST_LIMIT_S
-    while (status := request(transport, session, Query())).state is State.RUNNING and clock.now_s() < limit_s:
-        clock.wait_until(clock.now_s() + _REST_POLL_S)
-    return status
+def _meeting(session: Session) -> Meeting:
+    assert session.welcome is not None and session.status is not None, "the device was met"
+    return Meeting(session.welcome.boot_nonce, session.status)
 
 
-def _report(certainty: Certainty, last: Status, stream: Stream) -> PositionReport:
-    before = stream.ledger_before
+def _report(stream: Stream, session: Session, met: Meeting | None) -> PositionReport:
+    before, told = stream.ledger_before, _meeting(session)
     assert before is not None, "a motion begins with a ledger"
-    executed = last.ledger.executed_segments - before.executed_segments
-    return PositionReport(
-        certainty=certainty,
-        executed_segments=(executed, executed if certainty is Certainty.EXACT else stream.sent_segments),
-        total_segments=stream.total_segments,
-        moved_usteps=moved_usteps(before, last.ledger),
-    )
+    # What was sent since the last reply may have set an arm at rest in motion, so nothing is said of rest here.
+    known = Known(told.boot_nonce, before, told.status, stream.sent_segments, rested=False)
+    return judge(known, met, stream.steps, stream.released_spread_usteps)
 
 
 def _result(session: Session, now_s: float, began_s: float, stream: Stream | None = None) -> StreamResult:

@@ -3,6 +3,7 @@
 import contextlib
 import errno
 import os
+import secrets
 import select
 import sys
 from collections.abc import Iterator
@@ -15,6 +16,7 @@ from planarm.errors import LinkError
 from planarm.link.clock import Clock, RealClock
 
 WRITE_TIMEOUT_S = 1.0  # 25,000 bytes at 250,000 baud; more than ever waits to be sent
+TERMIOS2_BYTES, TCGETS2, TCSETS2 = 44, 0x802C542A, 0x402C542B  # Linux, asm-generic/termbits.h; c_cflag is at 8
 _SLICE_S = 0.005  # how late a deadline may be noticed on lines that select() does not know
 
 
@@ -32,6 +34,10 @@ class SerialTransport:
         if self._descriptor is not None:
             self._port.timeout = 0
             _prepare_terminal(self._port, self._descriptor)
+
+    def nonce(self) -> int:
+        """A random number of 32 bits."""
+        return secrets.randbits(32)
 
     def read(self, max_bytes: int, deadline_s: float) -> bytes:
         """Return what has arrived, waiting until `deadline_s` for the first byte."""
@@ -128,12 +134,29 @@ def _descriptor(port: serial.SerialBase) -> int | None:
 def _prepare_terminal(port: serial.SerialBase, descriptor: int) -> None:
     """Keep out openers that do not ask for pyserial's advisory lock, and have bytes handed over without delay.
 
-    Some USB chips hold bytes for 16 ms unless asked not to; drivers that know no such setting, ptys too, say so.
+    Some USB chips hold bytes for 16 ms unless asked not to; drivers that know no such setting, ptys too, say so. The
+    first opening resets an Uno, by DTR's edge. With HUPCL off the system leaves DTR as it is when the port is closed,
+    even by a program that was killed, so that the next opening makes no edge: the board keeps its position.
     """
     import fcntl  # noqa: PLC0415 - POSIX only
     import termios  # noqa: PLC0415
 
     if os.isatty(descriptor):
         fcntl.ioctl(descriptor, termios.TIOCEXCL)
+        _keep_dtr(descriptor)
         with contextlib.suppress(ValueError, NotImplementedError):
             port.set_low_latency_mode(True)
+
+
+def _keep_dtr(descriptor: int) -> None:
+    """Switch HUPCL off, and leave everything else as it is: `termios.tcsetattr` would lose a rate such as 250,000."""
+    import fcntl  # noqa: PLC0415 - POSIX only
+    import termios  # noqa: PLC0415
+
+    if sys.platform != "linux":
+        return
+    settings = bytearray(TERMIOS2_BYTES)
+    fcntl.ioctl(descriptor, TCGETS2, settings)
+    control = int.from_bytes(settings[8:12], sys.byteorder) & ~termios.HUPCL
+    settings[8:12] = control.to_bytes(4, sys.byteorder)
+    fcntl.ioctl(descriptor, TCSETS2, bytes(settings))

@@ -100,6 +100,11 @@ class Session:
         return self.welcome is not None
 
     @property
+    def next_seq(self) -> int:
+        """Number of the next frame."""
+        return self._arq.next_seq
+
+    @property
     def idle(self) -> bool:
         """Whether every frame sent has been acknowledged."""
         return self._arq.idle

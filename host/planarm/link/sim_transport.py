@@ -8,6 +8,7 @@ baud rate in both directions, ten bits a byte.
 import math
 from collections.abc import Iterator
 from contextlib import contextmanager
+from itertools import count
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -77,7 +78,12 @@ class SimTransport:
         self.clock: Clock = EmulatorClock(self._machine)
         self.pins = EmulatorPins(self.uno)
         self._received = bytearray()
+        self._nonces = count(1)
         self._open = True
+
+    def nonce(self) -> int:
+        """1, 2, 3 ...: the same run has the same bytes."""
+        return next(self._nonces)
 
     def read(self, max_bytes: int, deadline_s: float) -> bytes:
         """Run the board until it has sent something or its time is `deadline_s`; return at most `max_bytes` bytes."""

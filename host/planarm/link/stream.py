@@ -1,10 +1,9 @@
 """Streams a plan: asks, clears, enables, fills the queue, starts, keeps the queue full, and checks what was executed.
 
 A machine of explicit phases on top of a `Session`; no I/O. The device's queue is filled by credit: a reply tells the
-free bytes at the moment of its acknowledgement, so what may still be sent is that number less what is in flight.
-Segments go out in messages as full as they can be, each at most half of the window long, so that one is on the line
-while the other is acknowledged. When no message is in flight the device is asked for its status, no sooner than the
-segments now executing can have made room for the next message.
+free bytes at the moment of its acknowledgement, so what may still be sent is that number less what is in flight. When
+no message is in flight the device is asked for its status, no sooner than the segments now executing can have made room
+for the next message.
 
 `hold`, `resume`, `override` and `stop` may be called at any time; each says what the device is to do, and its status
 says when it is done. A hold that nobody here asked for, as a damaged byte may cause, is taken back.
@@ -16,14 +15,14 @@ from enum import Enum, auto
 from itertools import accumulate
 
 from planarm.errors import CertificateError, LinkError, StepsDifferError
-from planarm.link.position import moved_usteps
+from planarm.link.packing import Packer
+from planarm.link.plan_steps import PlanSteps
+from planarm.link.position import executed_since, moved_usteps
 from planarm.link.session import Session
 from planarm_wire.codec import encoded_bytes
 from planarm_wire.messages import (
     DEFAULT_WAKE_TICKS,
     HOLD_CODE,
-    HOST_WINDOW_BYTES,
-    MAX_PAYLOAD_BYTES,
     QUEUE_BYTES,
     QUEUE_FRAME_BYTES,
     TICKS_HZ,
@@ -38,20 +37,16 @@ from planarm_wire.messages import (
     Query,
     Resume,
     Segment,
-    Segments,
     Start,
     State,
     Status,
     Stop,
 )
-from planarm_wire.rates import NO_ALLOWANCE, Allowance, head_of
-from planarm_wire.steps import duration_ticks, is_last, signed_steps
+from planarm_wire.rates import Allowance
+from planarm_wire.steps import duration_ticks, is_last
 
-FRAME_BYTES = HOST_WINDOW_BYTES // 2
 MIN_POLL_S = 0.002  # a status and its question take 1.5 ms of the line
 MAX_POLL_S = 0.050  # keeps progress alive during long segments
-HEAD_BYTES = 3  # slow, fast and need of a SEGMENTS message
-LEAST_SEGMENT_BYTES = 3
 PERCENT = 100
 AT_EASE = (State.HOLDING, State.HELD, State.STARVED, State.STOPPING)
 """States of a motion in which the path clock does not keep the plan's time."""
@@ -65,13 +60,15 @@ class StreamOptions:
     5 ms. `release_when_done` lets go of the joints at the end: a loaded arm falls, so the drivers stay enabled unless
     asked. `allowances`, one a segment, let the device slow down along the path; without them it cannot. The motors'
     `start_stop_ticks` tell it from which interval on they may stop dead; a device whose drivers are enabled keeps what
-    it was told before.
+    it was told before. `released_spread_usteps` is how far each joint can move by itself while the drivers are
+    released; empty: any way.
     """
 
     lead_ticks: int = 160_000
     release_when_done: bool = False
     allowances: tuple[Allowance, ...] = ()
     start_stop_ticks: tuple[int, ...] = ()
+    released_spread_usteps: tuple[int, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,6 +85,25 @@ class StreamProgress:
     moved_usteps: tuple[int, ...]
     """Signed micro-steps of each joint since the start, those of the running segment included."""
     state: State
+    at_s: float
+    """Of the transport's clock."""
+    free_bytes: int
+    """Of the device's queue."""
+    retransmissions: int
+    """Frames sent again so far."""
+
+
+@dataclass(frozen=True, slots=True)
+class Joining:
+    """A motion of which the device holds a part, sent by a session that ended.
+
+    Attributes:
+        before: the ledger at its start.
+        accepted_segments: what the device took.
+    """
+
+    before: Ledger
+    accepted_segments: int
 
 
 class Phase(Enum):
@@ -118,14 +134,15 @@ class Stream:
         segments: Sequence[Segment],
         options: StreamOptions | None = None,
         on_progress: Callable[[StreamProgress], None] | None = None,
+        joining: Joining | None = None,
     ) -> None:
         _check_ends(segments)
+        self.steps = PlanSteps.of(segments)
         self.phase = Phase.OPENING
         self.ledger_before: Ledger | None = None
         self.cleared_fault = Fault.NONE
         self.started_s = 0.0
         self.least_queued = len(segments)
-        self.sent_segments = 0
         self.stopped = False
         self.unasked_holds = 0
         self._session = session
@@ -136,11 +153,21 @@ class Stream:
         self._seen: Status | None = None
         self._executed = 0
         self._executed_s = 0.0
-        self._message: Segments | None = None
-        self._allowances = self._options.allowances or (NO_ALLOWANCE,) * len(self._segments)
+        self._packer = Packer(session, segments, self._options.allowances)
+        self._joining = joining
         self._hold_wanted = False
         self._stop_wanted = False
         self._orders: list[HostMessage] = []
+
+    @property
+    def released_spread_usteps(self) -> tuple[int, ...]:
+        """How far each joint can move while the drivers are released; empty: any way."""
+        return self._options.released_spread_usteps
+
+    @property
+    def sent_segments(self) -> int:
+        """Segments sent so far, those of an earlier session included."""
+        return self._packer.sent
 
     @property
     def done(self) -> bool:
@@ -212,6 +239,9 @@ class Stream:
         if not self._session.idle:
             return
         status = self._status
+        if self._joining is not None:
+            self._join(self._joining, now_s)
+            return
         if status.state in (State.RUNNING, State.HOMING, *AT_EASE):
             raise LinkError(
                 "the device is executing the motion of an earlier session; wait until it has ended, then try again"
@@ -220,6 +250,17 @@ class Stream:
             self.cleared_fault = status.fault
             self._session.send(Clear(), now_s)
         self.phase = Phase.CLEARING
+
+    def _join(self, joining: Joining, now_s: float) -> None:
+        """Go on with a motion that the device is in the middle of."""
+        if self._status.state not in (State.RUNNING, State.READY, *AT_EASE):
+            raise LinkError(f"the device does not hold the motion any more: it is {self._status.state.name.lower()}")
+        self._session.guarded = True
+        self.ledger_before = joining.before
+        self._packer.sent = joining.accepted_segments
+        self.started_s = self._executed_s = now_s
+        self.phase = Phase.RUNNING
+        self._follow(now_s)
 
     def _configure(self, now_s: float) -> None:
         if not self._session.idle:
@@ -291,41 +332,11 @@ class Stream:
             self._session.send(self._orders.pop(0), now_s)
 
     def _send_segments(self, now_s: float) -> None:
-        while (message := self._next_message()) is not None:
-            if encoded_bytes(message) > self._credit or not self._session.fits(message):
+        while (message := self._packer.next_message()) is not None:
+            if self._packer.payload_bytes > self._credit or not self._session.fits(message):
                 return
             self._session.send(message, now_s)
-            self.sent_segments += len(message.segments)
-            self._message = None
-
-    def _next_message(self) -> Segments | None:
-        """Return the next segments, as many as one message may hold; None when all are sent."""
-        stale = self._message is None or self._is_long(self._message)  # stuffing changes with the frame's number
-        if stale and self.sent_segments < len(self._segments):
-            self._message = self._pack()
-        return self._message
-
-    def _pack(self) -> Segments:
-        most = MAX_PAYLOAD_BYTES // LEAST_SEGMENT_BYTES
-        count, room_bytes = 0, MAX_PAYLOAD_BYTES - HEAD_BYTES
-        for segment in self._segments[self.sent_segments : self.sent_segments + most]:
-            room_bytes -= encoded_bytes(segment)
-            if room_bytes < 0:
-                break
-            count += 1
-        message = self._message_of(count)
-        while self._is_long(message):
-            message = self._message_of(len(message.segments) - 1)
-        return message
-
-    def _message_of(self, count: int) -> Segments:
-        """Return the next `count` segments as a message; its head holds for all of them."""
-        part = slice(self.sent_segments, self.sent_segments + count)
-        return Segments(*head_of(self._allowances[part]), self._segments[part])
-
-    def _is_long(self, message: Segments) -> bool:
-        """Whether `message` takes more than its share of the window and can be made shorter."""
-        return len(message.segments) > 1 and self._session.encoded_bytes(message) > FRAME_BYTES
+            self._packer.take()
 
     @property
     def _credit(self) -> int:
@@ -334,12 +345,12 @@ class Stream:
 
     def _poll_due_s(self) -> float:
         """When the device can have room for the next message, or can have ended."""
-        message = self._next_message()
+        message = self._packer.next_message()
         until = self._executed
         if message is None:
             until = len(self._segments)
         else:  # a segment gives its bytes back when it is begun
-            wanted = encoded_bytes(message) - self._credit
+            wanted = self._packer.payload_bytes - self._credit
             while wanted > 0 and until < len(self._segments):
                 wanted -= encoded_bytes(self._segments[until])
                 until += 1
@@ -364,7 +375,7 @@ class Stream:
         if status is None or status is self._seen or self.ledger_before is None:
             return
         self._seen = status
-        executed = status.ledger.executed_segments - self.ledger_before.executed_segments
+        executed = executed_since(self.ledger_before, status.ledger)
         if executed > self.sent_segments:
             raise LinkError(
                 f"the device tells {executed} executed segments, but only {self.sent_segments} were sent;"
@@ -376,9 +387,9 @@ class Stream:
         if self.phase is Phase.RUNNING and self.sent_segments < len(self._segments):
             self.least_queued = min(self.least_queued, queued)
         if self._on_progress is not None:
-            self._on_progress(self._progress(status, queued))
+            self._on_progress(self._progress(status, queued, now_s))
 
-    def _progress(self, status: Status, queued: int) -> StreamProgress:
+    def _progress(self, status: Status, queued: int, now_s: float) -> StreamProgress:
         assert self.ledger_before is not None
         return StreamProgress(
             path_s=self._ends_ticks[self._executed] / TICKS_HZ,
@@ -388,6 +399,9 @@ class Stream:
             queued_segments=queued,
             moved_usteps=moved_usteps(self.ledger_before, status.ledger),
             state=status.state,
+            at_s=now_s,
+            free_bytes=status.free_bytes,
+            retransmissions=self._session.arq_counters.retransmissions,
         )
 
     def _stall_due_s(self) -> float:
@@ -413,7 +427,7 @@ class Stream:
                 " host and firmware disagree: flash the released image"
             )
         executed = moved_usteps(self.ledger_before, self._status.ledger)
-        planned = planned_usteps(self._segments)
+        planned = self.steps.planned_usteps()
         for joint, (done, meant) in enumerate(zip(executed, planned, strict=True), start=1):
             if done != meant:
                 raise StepsDifferError(
@@ -426,11 +440,6 @@ def config_of(start_stop_ticks: Sequence[int]) -> Config:
     """Return the wiring that is the firmware's default, with these start-stop intervals."""
     told = tuple(start_stop_ticks)
     return Config(PinMap.OWN, len(told), 0, 0, 0, DEFAULT_WAKE_TICKS, 0, told)
-
-
-def planned_usteps(segments: Sequence[Segment]) -> tuple[int, ...]:
-    """Signed micro-steps that `segments` move each joint by."""
-    return tuple(sum(signed_steps(move) for move in moves) for moves in zip(*(s.moves for s in segments), strict=True))
 
 
 def _check_ends(segments: Sequence[Segment]) -> None:

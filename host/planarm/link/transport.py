@@ -56,6 +56,13 @@ class Transport(Protocol):
         """The arm behind the board when it is an emulated one, else None."""
         ...
 
+    def nonce(self) -> int:
+        """Give a number of 32 bits for the next HELLO.
+
+        It is random on a real line, and counted on an emulated one, so that runs repeat to the byte.
+        """
+        ...
+
     def read(self, max_bytes: int, deadline_s: float) -> bytes:
         """Return 1 to `max_bytes` bytes as soon as there are any, or b"" once the clock shows `deadline_s`.
 
