@@ -77,9 +77,11 @@ def report(console: Console, cell_cm: float, every: bool) -> None:
     scene = scene_at(cell_cm)
     free_map = build_free_map(scene, 0.0)
     map_ms = median_ms(lambda: build_free_map(scene, 0.0))
+    nodes_ms = median_ms(lambda: build_free_map(scene, 0.0, whole_cells=False))
     console.print(
         f"\ncells of {cell_cm:g} cm: {free_map.region.size} nodes, {free_map.free_nodes} free; three-valued map in "
-        f"{digits(map_ms)} ms, {digits(1e6 * map_ms / free_map.region.size)} ns a cell; "
+        f"{digits(map_ms)} ms, {digits(1e6 * map_ms / free_map.region.size)} ns a cell, two-valued "
+        f"{digits(1e6 * nodes_ms / free_map.region.size)} ns a cell; "
         f"map and search take {megabytes(free_map):.0f} MB and {BYTES_PER_ENTRY} bytes for each open-list entry"
     )
     table = Table(box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0), pad_edge=False)
@@ -144,7 +146,7 @@ def measure(task: Task, planner: PlannerSpec) -> tuple[float, float]:
     offsets = primitive(offsets) if planner.moves == "proved" else offsets
     moves, reach = make_moves(offsets, lattice), int(np.abs(offsets).max())
     least = WHOLE_ROOM if planner.moves == "proved" else ROOM
-    rules = Rules(LEGAL[planner.moves], 0, 0)
+    rules = Rules(LEGAL[planner.moves], 0, 0, least if len(offsets) <= FEW_MOVES else 0)
     start, goal = (node_of(lattice, point) for point in (task.start_cm, task.goal_cm))
 
     def search() -> NDArray[np.int64]:

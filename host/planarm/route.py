@@ -64,7 +64,7 @@ def tip_route(scene: Scene, margin_cm: float) -> Route:
     bounds_cm = []
     for side in elbow_sides(scene.arm):
         try:
-            free_map = build_free_map(scene, margin_cm, side)
+            free_map = build_free_map(scene, margin_cm, side, whole_cells=scene.planner.moves == "proved")
             check_task(scene, free_map)
         except SceneError:  # on this side; told below when it is so on all sides
             continue

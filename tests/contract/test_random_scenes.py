@@ -7,7 +7,7 @@ than the margin.
 """
 
 from collections import Counter
-from functools import cache
+from functools import cache, lru_cache
 from itertools import pairwise
 from math import inf
 
@@ -61,29 +61,36 @@ def shifted(array, dx, dy, nothing):
     return padded[reach + dy : reach + dy + rows, reach + dx : reach + dx + columns]
 
 
-def dijkstra_cm(free_map, offsets, moves, start_cm, goal_cm):
+@lru_cache(maxsize=256)
+def legal_moves(seed, dx, dy, moves):
+    """Where the move (dx, dy) may be made, for each [y, x]; those of one scene are shared by all stencils."""
+    _, free_map, _, _ = scene_of(seed)
+    if (dy, dx) < (0, 0):  # a move is as legal one way as the other
+        return shifted(legal_moves(seed, -dx, -dy, moves), dx, dy, False)
+    free = free_map.region == FREE
+    legal = free & shifted(free, dx, dy, False)
+    if moves == "cells":
+        legal &= np.logical_and.reduce([shifted(free, x, y, False) for x, y in cover(dx, dy)])
+    elif moves == "proved":
+        whole = np.logical_and.reduce([shifted(free_map.whole, x, y, False) for x, y in cover(dx, dy)])
+        iy, ix = np.nonzero(legal & ~whole)
+        ends = (free_map.x_cm[ix], free_map.y_cm[iy], free_map.x_cm[ix + dx], free_map.y_cm[iy + dy])
+        verdicts = [prove_line(free_map.world, *line)[0] for line in zip(*(end.tolist() for end in ends), strict=True)]
+        legal[iy, ix] = np.array(verdicts, int) == PROVED
+    return legal
+
+
+def dijkstra_cm(seed, offsets, moves):
     """Shortest length on all legal moves of the whole neighbourhood."""
-    free, columns = free_map.region == FREE, free_map.region.shape[1]
-    number = np.arange(free.size).reshape(free.shape)
+    _, free_map, start_cm, goal_cm = scene_of(seed)
+    columns, size = free_map.region.shape[1], free_map.region.size
     tails, heads, lengths = [], [], []
     for dx, dy in offsets.tolist():
-        legal = free & shifted(free, dx, dy, False)
-        if moves == "cells":
-            legal &= np.logical_and.reduce([shifted(free, x, y, False) for x, y in cover(dx, dy)])
-        elif moves == "proved":
-            whole = np.logical_and.reduce([shifted(free_map.whole, x, y, False) for x, y in cover(dx, dy)])
-            for iy, ix in np.argwhere(legal & ~whole).tolist():
-                a, b = (ix, iy), (ix + dx, iy + dy)
-                first, second = sorted((a, b), key=lambda node: node[::-1])
-                ends = [(free_map.x_cm[x], free_map.y_cm[y]) for x, y in (first, second)]
-                legal[iy, ix] = prove_line(free_map.world, *ends[0], *ends[1])[0] == PROVED
-        at = number[legal]
+        at = np.flatnonzero(legal_moves(seed, dx, dy, moves))
         tails.append(at)
         heads.append(at + dy * columns + dx)
         lengths.append(np.full(at.size, free_map.cell_cm * np.hypot(dx, dy)))
-    graph = csr_matrix(
-        (np.concatenate(lengths), (np.concatenate(tails), np.concatenate(heads))), shape=(free.size, free.size)
-    )
+    graph = csr_matrix((np.concatenate(lengths), (np.concatenate(tails), np.concatenate(heads))), shape=(size, size))
     start, goal = (
         int(np.argmin(np.abs(free_map.y_cm - y))) * columns + int(np.argmin(np.abs(free_map.x_cm - x)))
         for x, y in (start_cm, goal_cm)
@@ -112,7 +119,7 @@ def test_planners_on_random_scenes(moves, sized):
         lengths = {}
         for algorithm, neighbours in STENCILS if sized(0, 1) else STENCILS[seed % 2 :: 2]:
             result = find_path(free_map, start_cm, goal_cm, planner(algorithm, neighbours, moves=moves))
-            expected_cm = dijkstra_cm(free_map, stencil(algorithm, neighbours), moves, start_cm, goal_cm)
+            expected_cm = dijkstra_cm(seed, stencil(algorithm, neighbours), moves)
             found_cm = result.path.length_cm if result.path else inf
             assert found_cm == pytest.approx(expected_cm, rel=1e-12), f"seed {seed}: {algorithm} {neighbours} {moves}"
             lengths[algorithm, neighbours] = found_cm
@@ -130,6 +137,7 @@ def test_planners_on_random_scenes(moves, sized):
     assert min(seen.values()) >= 0.5 * sized(8, 1000), f"most scenes have paths: {seen}"
 
 
+@cache
 def any_angle_on(seed, moves):
     """Check the any-angle planners on one scene; count what was seen."""
     _, free_map, start_cm, goal_cm = scene_of(seed)

@@ -213,3 +213,11 @@ def test_a_thousand_obstacles_are_judged_like_one_by_one():
     clearance = clearances_cm(world, q[reached])
     assert np.array_equal((free_map.region == FREE)[reached], clearance > scene.margin_cm)
     assert 0.05 < np.mean(clearance <= scene.margin_cm) < 0.6
+
+
+def test_a_map_of_nodes_alone_has_the_same_nodes():
+    for case in (1, 2):
+        scene = load_scene(EXAMPLES / f"table1_case{case}.toml")
+        both, alone = build_free_map(scene), build_free_map(scene, whole_cells=False)
+        assert np.array_equal(both.region, alone.region)
+        assert both.whole.any() and not alone.whole.any()

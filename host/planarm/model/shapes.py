@@ -7,6 +7,7 @@ up, the hexagon is regular with a vertex towards +x.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import accumulate
 from math import cos, hypot, radians, sin
 from typing import NamedTuple, Self
 
@@ -77,7 +78,7 @@ def obstacle_set(shapes: Sequence[Circle | Polygon]) -> ObstacleSet:
     return ObstacleSet(
         centers_cm=np.array([b.center_cm for b in bounds], np.float64).reshape(-1, 2),
         radii_cm=np.array([b.radius_cm for b in bounds], np.float64),
-        first_vertex=np.cumsum([0, *(len(c) for c in corners)], dtype=np.int64),
+        first_vertex=np.array([0, *accumulate(map(len, corners))], np.int64),
         vertices_cm=np.array([v for c in corners for v in c], np.float64).reshape(-1, 2),
     )
 

@@ -88,6 +88,8 @@ class Moves(NamedTuple):
     """Where the move's cells begin in `cover`; one value more than there are moves."""
     cover: NDArray[np.int64]
     """The cells that each move crosses, relative to the node that it leaves."""
+    longest: int
+    """The greatest cost of a move."""
 
 
 class Rules(NamedTuple):
@@ -98,6 +100,8 @@ class Rules(NamedTuple):
     drawn: int
     """Moves drawn at random at each expanded node, or 0 to use all."""
     seed: int
+    around: int = 0
+    """With the 8 nearest moves: where all nodes around one have this much room, only THREE are tried; 0: never."""
 
 
 class Found(NamedTuple):
@@ -136,7 +140,7 @@ def best_first(
     """
     wide_open = lattice.room[:0] if open_room is None else open_room
     width = lattice.width
-    longest = 2 * int(moves.cost.max()) >> BUCKET_BITS
+    longest = 2 * moves.longest >> BUCKET_BITS
     lowest_f = norm(moves.planes, start % width - goal % width, start // width - goal // width)
     memory = borrow(lattice.room.size)
     memory.state[: lattice.room.size] = lattice.room
@@ -160,7 +164,7 @@ def flood(lattice: Lattice, moves: Moves, world: ArmWorld, start: int) -> NDArra
     everywhere = moves._replace(planes=np.zeros_like(moves.planes))
     memory = borrow(lattice.room.size)
     memory.state[: lattice.room.size] = lattice.room
-    queue = make_open_list(2 * (int(moves.cost.max()) >> BUCKET_BITS) + 4, memory.entry_node, memory.entry_below)
+    queue = make_open_list(2 * (moves.longest >> BUCKET_BITS) + 4, memory.entry_node, memory.entry_below)
     memory.state[start], memory.g[start] = START, 1
     queue.node[0], queue.below[0], queue.ring[0] = start, NONE, 0
     queue.counts[MADE], queue.counts[WAITING] = 1, 1
@@ -195,7 +199,7 @@ def expand(  # noqa: C901, PLR0912, PLR0915 - one flat loop: a call that hands o
     dx, dy, jump, cost, planes, after = moves.dx, moves.dy, moves.jump, moves.cost, moves.planes, moves.after
     cover_first, cover = moves.cover_first, moves.cover
     queued, below, ring, counts = queue
-    mask, every, prune = ring.size - 1, jump.size, wide_open.size > 0
+    mask, every, prune, around = ring.size - 1, jump.size, wide_open.size > 0, rules.around
     made, waiting, bucket, expanded = counts[MADE], counts[WAITING], counts[BUCKET], counts[EXPANDED]
     goal_x, goal_y, rows_per_node = goal % width, goal // width, 1.0 / width
     order = after[0].copy()
@@ -250,8 +254,25 @@ def expand(  # noqa: C901, PLR0912, PLR0915 - one flat loop: a call that hands o
         if rules.drawn > 0:
             used = rules.drawn
             draw_subset(order, used, rules.seed, 1 + node)
-        elif prune and wide_open[node] and came != START:
-            row, used = 1 + (came & (CHECKED - 1)) - REACHED, THREE
+        elif came != START:
+            if prune:
+                in_the_open = wide_open[node] != 0
+            elif around != 0:
+                above, under = node + width, node - width
+                in_the_open = (
+                    room[above] >= around
+                    and room[under] >= around
+                    and room[node - 1] >= around
+                    and room[node + 1] >= around
+                    and room[above - 1] >= around
+                    and room[above + 1] >= around
+                    and room[under - 1] >= around
+                    and room[under + 1] >= around
+                )
+            else:
+                in_the_open = False
+            if in_the_open:
+                row, used = 1 + (came & (CHECKED - 1)) - REACHED, THREE
         for i in range(used):
             k = order[i] if row == 0 else after[row, i]
             to = node + jump[k]
@@ -361,7 +382,7 @@ def load_kernels(world: ArmWorld) -> None:
     """Compile the search, or load it from the cache, by a search from a node to itself."""
     one, first = np.ones(1, np.int64), np.zeros(2, np.int64)
     lattice = Lattice(np.ones(1, np.uint8), width=1, column=0, row=0, cell_cm=1.0)
-    moves = Moves(one, one, one, one, np.ones((1, 2), np.int64), np.zeros((2, 1), np.int64), first, one)
+    moves = Moves(one, one, one, one, np.ones((1, 2), np.int64), np.zeros((2, 1), np.int64), first, one, 1)
     best_first(lattice, moves, Rules(PROOF, 0, 0), world, 0, 0)
 
 

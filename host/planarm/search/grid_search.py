@@ -40,7 +40,7 @@ LEGAL: Final[dict[Moves, int]] = {"nodes": NODES, "cells": CELLS, "proved": PROO
 PULLED: Final = ("taut", "any_angle")
 THETA: Final = ("theta_star", "lazy_theta_star")
 FEW_MOVES: Final = 8
-"""With no more moves than this, looking at all of them costs less than finding out where not all have to be."""
+"""With no more moves than this the search looks itself for where not all have to be tried."""
 
 
 def find_path(free_map: FreeMap, start_cm: Point, goal_cm: Point, planner: PlannerSpec) -> SearchResult:
@@ -87,7 +87,7 @@ def _search(
         return theta_star(
             lattice, make_moves(offsets, lattice), rules, free_map.world, start_node, goal_node, lazy=lazy
         )
-    whole_stencil, drawn, wide_open = offsets, 0, None
+    whole_stencil, drawn, wide_open, around = offsets, 0, None, 0
     if planner.algorithm == "chaos_a_star":
         drawn = DRAWN[planner.neighbours]
         if planner.subset == "run":
@@ -95,10 +95,12 @@ def _search(
     else:
         if planner.moves != "nodes":
             offsets = primitive(offsets)
+        least = WHOLE_ROOM if planner.moves == "proved" else ROOM
         if len(offsets) > FEW_MOVES:
-            least = WHOLE_ROOM if planner.moves == "proved" else ROOM
             wide_open = open_room(lattice, int(np.abs(offsets).max()), least)
-    rules = Rules(LEGAL[planner.moves], drawn, planner.seed)
+        else:
+            around = least
+    rules = Rules(LEGAL[planner.moves], drawn, planner.seed, around)
     moves = make_moves(offsets, lattice, whole_stencil)
     return best_first(lattice, moves, rules, free_map.world, start_node, goal_node, wide_open)
 

@@ -65,6 +65,7 @@ def _make_moves(moves: tuple[tuple[int, int], ...], stencil: tuple[tuple[int, in
         after=_moves_after(offsets),
         cover_first=np.cumsum([0, *map(len, covers)], dtype=np.int64),
         cover=np.array([cell for cells in covers for cell in cells], dtype=np.int64),
+        longest=int(move_costs(offsets).max()),
     )
 
 

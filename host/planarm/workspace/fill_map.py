@@ -50,7 +50,7 @@ MIXED_BLOCK = 255
 def fill(
     world: ArmWorld, x_cm: Floats, y_cm: Floats, cell_cm: float, region: NDArray[np.uint8], whole: NDArray[np.bool_]
 ) -> None:
-    """Fill `region` and `whole`, both [iy, ix], for the nodes at `x_cm` and `y_cm`."""
+    """Fill `region` and `whole`, both [iy, ix], for the nodes at `x_cm` and `y_cm`; no `whole` that has no rows."""
     rows, columns = region.shape
     obstacles = world.obstacles.radii_cm.size
     block = LEAF_CELLS
@@ -99,7 +99,9 @@ def _fill_block(
         if verdict != MIXED_BLOCK:
             for y_at in range(iy, bottom):  # a slice takes Numba seconds to compile
                 for x_at in range(ix, right):
-                    region[y_at, x_at], whole[y_at, x_at] = verdict, verdict == FREE
+                    region[y_at, x_at] = verdict
+                    if whole.size > 0:
+                        whole[y_at, x_at] = verdict == FREE
         elif size <= LEAF_CELLS:
             _fill_cells(world, x_cm, y_cm, cell_cm, region, whole, iy, bottom, ix, right, near[end:kept], no_limit)
         else:
@@ -181,6 +183,7 @@ def _fill_cells(
     """Judge the cells of a small block one by one."""
     arm = world.arm
     centers, radii, first_vertex = world.obstacles.centers_cm, world.obstacles.radii_cm, world.obstacles.first_vertex
+    proving = whole.size > 0
     bx, by, margin, rho = arm.base_x_cm, arm.base_y_cm, arm.margin_cm, 0.5 * sqrt(2.0) * cell_cm
     for iy in range(top, bottom):
         for ix in range(left, right):
@@ -189,22 +192,28 @@ def _fill_cells(
             r = sqrt(r2)
             node = region_at(arm, r)
             if node != FREE:
-                region[iy, ix], whole[iy, ix] = node, False
+                region[iy, ix] = node
+                if proving:
+                    whole[iy, ix] = False
                 continue
             ex, ey = elbow_from_base(arm, x, y, r2, r)
-            free = rho < r and disc_within_reach(arm, r, rho)
+            free = proving and rho < r and disc_within_reach(arm, r, rho)
             moves = displacement_bound(arm, r, rho) + ROUNDING_CM if free else 0.0
             if not no_limit and not within_limits(arm, ex + bx, ey + by, moves):
                 free = False
                 theta1 = theta1_at(arm, x + bx, y + by, acos(cos_beta_at(arm, r)))
                 if theta1 < arm.theta1_min_rad or theta1 > arm.theta1_max_rad:
-                    region[iy, ix], whole[iy, ix] = LIMIT, False
+                    region[iy, ix] = LIMIT
+                    if proving:
+                        whole[iy, ix] = False
                     continue
             if arm.floor:
                 height = floor_clearance(arm, ey + by, y + by)
                 free = free and height > margin + moves
                 if height <= margin:
-                    region[iy, ix], whole[iy, ix] = LIMIT, False
+                    region[iy, ix] = LIMIT
+                    if proving:
+                        whole[iy, ix] = False
                     continue
             for i in near:
                 cx, cy, keep = centers[i, 0] - bx, centers[i, 1] - by, radii[i] + margin
@@ -218,4 +227,6 @@ def _fill_cells(
                 if blocked:
                     node, free = OBSTACLE, False
                     break
-            region[iy, ix], whole[iy, ix] = node, free
+            region[iy, ix] = node
+            if proving:
+                whole[iy, ix] = free

@@ -47,7 +47,9 @@ class FreeMap:
         return np.where(self.whole, WHOLE, np.where(self.region == FREE, MIXED, BLOCKED_CELL)).astype(np.uint8)
 
 
-def build_free_map(scene: Scene, margin_cm: float | None = None, elbow: ElbowSide | None = None) -> FreeMap:
+def build_free_map(
+    scene: Scene, margin_cm: float | None = None, elbow: ElbowSide | None = None, *, whole_cells: bool = True
+) -> FreeMap:
     """Return the free Cartesian space of a scene.
 
     Args:
@@ -55,18 +57,21 @@ def build_free_map(scene: Scene, margin_cm: float | None = None, elbow: ElbowSid
         margin_cm: a node is blocked where a link's centre line comes this near to an obstacle; None takes the
             scene's: half the link's width plus the clearance.
         elbow: the elbow side; None takes the scene's, which must then not be "either".
+        whole_cells: False asks for the nodes alone, in half the time; then no cell is known to be free as a whole.
 
     Raises:
         SceneError: the limits of theta2 leave no pose on this elbow side; or the side is open.
     """
     world = build_world(scene, margin_cm, elbow)
     cell_cm = scene.workspace.cell_cm
-    x_cm = np.array(scene.workspace.columns, np.float64) * cell_cm
-    y_cm = np.array(scene.workspace.rows, np.float64) * cell_cm
+    x_cm, y_cm = (
+        np.arange(span.start, span.stop, dtype=np.float64) * cell_cm
+        for span in (scene.workspace.columns, scene.workspace.rows)
+    )
     shape = (len(y_cm), len(x_cm))
     region = np.empty(shape, np.uint8)
-    whole = np.empty(shape, np.bool_)
-    fill(world, x_cm, y_cm, cell_cm, region, whole)
+    whole = np.empty(shape, np.bool_) if whole_cells else np.zeros(shape, np.bool_)
+    fill(world, x_cm, y_cm, cell_cm, region, whole if whole_cells else whole[:0])
     for array in (x_cm, y_cm, region, whole):
         array.flags.writeable = False
     return FreeMap(

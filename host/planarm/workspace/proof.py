@@ -43,6 +43,9 @@ Floats = NDArray[np.float64]
 # Verdicts: the whole piece is free; a pose on it is not (the counterexample is told); neither could be shown.
 PROVED, BLOCKED, UNPROVED = 0, 1, 2
 
+ALL = -1
+"""Stands for the number of obstacles to look at."""
+
 SMALLEST_CM = 1e-3
 """Radius of the smallest disc of a cover: what cannot be proved with it stays unproved."""
 
@@ -101,6 +104,8 @@ def disc_verdict(world: ArmWorld, x_cm: float, y_cm: float, rho_cm: float) -> in
         obstacles.radii_cm,
         obstacles.first_vertex,
         obstacles.vertices_cm,
+        obstacles.first_vertex,
+        ALL,
         x_cm - world.arm.base_x_cm,
         y_cm - world.arm.base_y_cm,
         rho_cm,
@@ -114,11 +119,16 @@ def _verdict(
     radii_cm: Floats,
     first_vertex: NDArray[np.int64],
     vertices_cm: Floats,
+    near: NDArray[np.int64],
+    count: int,
     x: float,
     y: float,
     rho_cm: float,
 ) -> int:
-    """`disc_verdict` for a disc around (x, y) from the base, with the obstacles' arrays one by one, which is faster."""
+    """`disc_verdict` for a disc around (x, y) from the base, with the obstacles' arrays one by one, which is faster.
+
+    Only the obstacles in the first `count` places of `near` are looked at; all when `count` is ALL.
+    """
     bx, by, margin, per_l1, per_l2 = arm.base_x_cm, arm.base_y_cm, arm.margin_cm, arm.per_l1, arm.per_l2
     r2 = x * x + y * y
     r = sqrt(r2)
@@ -130,7 +140,8 @@ def _verdict(
     if height <= margin:
         return BLOCKED
     free = rho_cm < r and height > margin + moves
-    for i in range(radii_cm.size):
+    for k in range(radii_cm.size if count == ALL else count):
+        i = k if count == ALL else near[k]
         cx, cy, keep = centers_cm[i, 0] - bx, centers_cm[i, 1] - by, radii_cm[i] + margin
         apart2 = links_apart2(cx, cy, ex, ey, x, y, per_l1, per_l2)
         if apart2 > (keep + moves) * (keep + moves):
@@ -151,6 +162,27 @@ def _verdict(
         return PROVED if free else UNPROVED
     theta1 = theta1_at(arm, bx + x, by + y, acos(cos_beta_at(arm, r)))
     return BLOCKED if theta1 < arm.theta1_min_rad or theta1 > arm.theta1_max_rad else UNPROVED
+
+
+@kernel
+def _near_obstacles(
+    arm: TwoLinkArm, centers_cm: Floats, radii_cm: Floats, x: float, y: float, rho_cm: float, near: NDArray[np.int64]
+) -> int:
+    """Fill `near` with the obstacles that the arm may touch while the tip is in a disc; return how many.
+
+    The others need not be looked at again for any disc within this one.
+    """
+    r2 = x * x + y * y
+    r = sqrt(r2)
+    ex, ey = elbow_from_base(arm, x, y, r2, r)
+    reach = displacement_bound(arm, r, rho_cm) + ROUNDING_CM + arm.margin_cm
+    count = 0
+    for i in range(radii_cm.size):
+        cx, cy, keep = centers_cm[i, 0] - arm.base_x_cm, centers_cm[i, 1] - arm.base_y_cm, radii_cm[i] + reach
+        if links_apart2(cx, cy, ex, ey, x, y, arm.per_l1, arm.per_l2) <= keep * keep:
+            near[count] = i
+            count += 1
+    return count
 
 
 @kernel
@@ -195,11 +227,15 @@ def prove_line_by(world: ArmWorld, x0: float, y0: float, x1: float, y1: float, s
         x, y = x0 + share * dx, y0 + share * dy
         if region_at(arm, sqrt(x * x + y * y)) != FREE:
             return BLOCKED, share
-    start, width = 0.0, 1.0
+    start, width, near, count = 0.0, 1.0, first_vertex, ALL
     while start < 1.0:
         middle = start + 0.5 * width
         rho = 0.5 * width * length
-        verdict = _verdict(arm, centers, radii, first_vertex, vertices, x0 + middle * dx, y0 + middle * dy, rho)
+        x, y = x0 + middle * dx, y0 + middle * dy
+        verdict = _verdict(arm, centers, radii, first_vertex, vertices, near, count, x, y, rho)
+        if count == ALL and verdict == UNPROVED and radii.size > 1:
+            near = np.empty(radii.size, np.int64)
+            count = _near_obstacles(arm, centers, radii, x, y, rho, near)
         if verdict == PROVED:
             start, width = next_piece(start, width)
         elif verdict == BLOCKED or rho <= smallest_cm:
