@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from itertools import islice
 
@@ -54,7 +55,9 @@ class Alternative:
         }
 
 
-def alternatives(scene: Scene, margin_cm: float, count: int) -> list[Alternative]:
+def alternatives(
+    scene: Scene, margin_cm: float, count: int, told: Callable[[float], None] = lambda _share: None
+) -> list[Alternative]:
     """Return up to `count` distinct routes, the shortest tip's way first.
 
     Each is what planning would make of it: in tip space where the scene plans there and the elbow keeps its side, else
@@ -64,6 +67,7 @@ def alternatives(scene: Scene, margin_cm: float, count: int) -> list[Alternative
         scene: the scene.
         margin_cm: least distance of a link's centre line to an obstacle.
         count: how many are wanted.
+        told: told the share that is done.
 
     Raises:
         SceneError, NoPathError: there is none at all.
@@ -71,7 +75,10 @@ def alternatives(scene: Scene, margin_cm: float, count: int) -> list[Alternative
     spec = scene.joint_space or JointSpaceSpec(
         objective="tip_length", start_elbow=scene.arm.elbow, goal_elbow=scene.arm.elbow
     )
-    found = [_alternative(scene, margin_cm, way) for way in islice(ways(scene, margin_cm, spec), count)]
+    found = []
+    for way in islice(ways(scene, margin_cm, spec), count):
+        found.append(_alternative(scene, margin_cm, way))
+        told(len(found) / count)
     if not found:
         raise no_path(scene, diagnose(scene, margin_cm))
     return sorted(found, key=lambda one: one.path.length_cm)

@@ -11,6 +11,7 @@ from planarm.errors import NoPathError, SceneError
 from planarm.model.arm import Arm
 from planarm.roadmap.planning import RoadmapTask, joint_route_of
 from planarm.scene import JointSpaceSpec, Scene
+from planarm.search.costed import JOINT_TRAVEL, Price, time_price
 from planarm.search.diagnosis import Diagnosis, diagnose, diagnose_joints
 from planarm.search.grid_search import find_path
 from planarm.search.joint_space import SIDES, JointRoute, find_joint_route, tip_points_cm
@@ -60,22 +61,32 @@ def find_route(scene: Scene, margin_cm: float) -> Route:
 
 def tip_route(scene: Scene, margin_cm: float) -> Route:
     """Return the route along the shortest path of the tip on any allowed elbow side; errors as `find_route`."""
-    found: list[tuple[FreeMap, Path, float]] = []
+    found: list[tuple[FreeMap, Path, float, float]] = []
     bounds_cm = []
+    price = search_price(scene)
     for side in elbow_sides(scene.arm):
         try:
             free_map = build_free_map(scene, margin_cm, side, whole_cells=scene.planner.moves == "proved")
             check_task(scene, free_map)
         except SceneError:  # on this side; told below when it is so on all sides
             continue
-        result = find_path(free_map, scene.task.start_cm, scene.task.goal_cm, scene.planner)
+        result = find_path(free_map, scene.task.start_cm, scene.task.goal_cm, scene.planner, price)
         if result.path is not None:
-            found.append((free_map, result.path, result.plan_s))
+            cost = result.path.length_cm if result.cost is None else result.cost
+            found.append((free_map, result.path, result.plan_s, cost))
             bounds_cm.append(result.bound_cm)
     if not found:
         raise no_path(scene, diagnose(scene, margin_cm))
-    free_map, path, search_s = min(found, key=lambda one: one[1].length_cm)
+    free_map, path, search_s, _ = min(found, key=lambda one: one[3])
     return Route(free_map, path, smoothed(scene, free_map, path), search_s, bound_cm=min(bounds_cm))
+
+
+def search_price(scene: Scene) -> Price | None:
+    """Return what a scene's objective makes a way cost; None for its length."""
+    if scene.planner.objective == "length":
+        return None
+    first, second = (joint.max_speed_rad_s for joint in scene.joints)
+    return JOINT_TRAVEL if scene.planner.objective == "joint_travel" else time_price((first, second))
 
 
 def joint_route(scene: Scene, margin_cm: float, spec: JointSpaceSpec) -> Route:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import json
 from dataclasses import asdict, replace
+from itertools import count
 from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -15,9 +16,11 @@ from planarm.cli.terminal import terminal
 from planarm.output import writing
 
 if TYPE_CHECKING:
+    from planarm.envelope.largest import Certify
     from planarm.envelope.maps import EnvelopeMaps
     from planarm.model.kinematics import ElbowSide
     from planarm.scene import Scene
+    from planarm.stepping.certificate import Certificate
 
 NAMES = ("tip_error_mm", "hz_per_cm_s", "largest_cm_s", "manipulability_cm2")
 
@@ -28,18 +31,20 @@ def execute(options: argparse.Namespace) -> int:
 
     scene = chosen_scene(options)
     compile_first("planarm")
-    from planarm.envelope.largest import largest_feed, largest_payload_kg
+    from planarm.envelope.largest import MOST_TRIALS, largest_feed, largest_payload_kg
     from planarm.envelope.maps import envelope_maps
     from planarm.envelope.snap import snap
     from planarm.pipeline import plan_scene
-    from planarm.stepping.certificate import Certificate
     from planarm.warm_up import warm_up
 
     out = Path(options.out or Path("out") / f"{Path(scene.source).stem}-envelope")
     with writing(out):
         out.mkdir(parents=True, exist_ok=True)
     side: ElbowSide = "down" if scene.arm.elbow == "down" else "up"
-    maps = envelope_maps(scene, side)
+    with progress(options.json) as notice:
+        notice("maps", 0.0)
+        maps = envelope_maps(scene, side)
+        notice("maps", 1.0)
     told: dict[str, Any] = {"scene": scene.name, "elbow": side}
     for name in NAMES:
         values = getattr(maps, name)
@@ -50,18 +55,24 @@ def execute(options: argparse.Namespace) -> int:
         # The planner as the scene has it, but not for time: a bisection needs the same answer twice.
         one = replace(scene, planner=replace(scene.planner, objective="length"))
 
-        def certify(changed: Scene) -> Certificate:
-            return plan_scene(changed, lambda _stage, _share: None).certificate
-
         with progress(options.json) as notice:
             notice("kernels", 0.0)
             warm_up(on_roadmap=scene.planner.on_roadmap)
             notice("kernels", 1.0)
-            notice("payload", 0.0)
-            told["payload_kg"] = asdict(largest_payload_kg(one, certify))
+
+            def certify_at(stage: str) -> Certify:
+                """Return what plans a scene for one bisection, and tells how many of the most trials are done."""
+                trial = count()
+
+                def certify(changed: Scene) -> Certificate:
+                    notice(stage, next(trial) / MOST_TRIALS)
+                    return plan_scene(changed, lambda _stage, _share: None).certificate
+
+                return certify
+
+            told["payload_kg"] = asdict(largest_payload_kg(one, certify_at("payload")))
             notice("payload", 1.0)
-            notice("feed", 0.0)
-            told["feed"] = asdict(largest_feed(one, certify))
+            told["feed"] = asdict(largest_feed(one, certify_at("feed")))
             notice("feed", 1.0)
     _write(out, scene, maps, told)
     if options.json:

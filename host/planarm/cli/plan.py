@@ -78,7 +78,9 @@ def _alternatives(scene: Scene, options: argparse.Namespace) -> list[dict[str, o
 
     with progress(options.json) as notice:
         notice("routes", 0.0)
-        found = alternatives(scene, planning_margin_cm(scene), options.alternatives)
+        found = alternatives(
+            scene, planning_margin_cm(scene), options.alternatives, lambda share: notice("routes", share)
+        )
         notice("routes", 1.0)
     if not options.json:
         terminal().print(_table(found, scene.name))

@@ -11,6 +11,8 @@ Certify = Callable[[Scene], Certificate]
 """Plans a scene and returns the certificate."""
 
 MOST_DOUBLINGS = 6
+HALVINGS = 6
+MOST_TRIALS = MOST_DOUBLINGS + HALVINGS
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,7 +30,7 @@ class Largest:
     because: str
 
 
-def largest_payload_kg(scene: Scene, certify: Certify, first_kg: float = 0.1, steps: int = 6) -> Largest:
+def largest_payload_kg(scene: Scene, certify: Certify, first_kg: float = 0.1, steps: int = HALVINGS) -> Largest:
     """Return the largest mass at the end of the arm, beside what the scene's links and motors weigh."""
 
     def loaded(kg: float) -> Scene:
@@ -38,7 +40,7 @@ def largest_payload_kg(scene: Scene, certify: Certify, first_kg: float = 0.1, st
     return bisect(loaded, certify, first_kg, steps)
 
 
-def largest_feed(scene: Scene, certify: Certify, steps: int = 6) -> Largest:
+def largest_feed(scene: Scene, certify: Certify, steps: int = HALVINGS) -> Largest:
     """Return by how much all joints' speed limits can be raised, 1 being the scene's own."""
 
     def faster(factor: float) -> Scene:

@@ -75,7 +75,9 @@ ELBOWS: tuple[Elbow, ...] = ("up", "down", "either")
 SHAPES: tuple[Shape, ...] = ("circle", "square", "diamond", "triangle", "hexagon", "polygon")
 SUBSETS: tuple[Subset, ...] = ("run", "expansion")
 MOVES: tuple[Moves, ...] = ("proved", "cells", "nodes")
-OBJECTIVES: tuple[Objective, ...] = ("length", "time")
+OBJECTIVES: tuple[Objective, ...] = ("length", "joint_travel", "time")
+LENGTH_ONLY = ("chaos_a_star", "theta_star", "lazy_theta_star")
+"""Algorithms that search by length, whatever else is wanted."""
 DRIVERS = ("a4988", "drv8825", "tmc2208", "tmc2209", "dm542", "tb6600")
 NEIGHBOURS: dict[Algorithm, tuple[int, ...]] = {
     "a_star": (8,),
@@ -288,13 +290,17 @@ def _planner(table: Table) -> PlannerSpec:
     neighbours = table.integer("neighbours", known[0], at_least=1, at_most=1000)
     if neighbours not in known:
         table.reject("neighbours", neighbours, f"one of {', '.join(map(str, sorted(known)))} (algorithm {algorithm!r})")
+    objective = table.choice("objective", OBJECTIVES, "length")
+    if objective == "joint_travel" and algorithm in LENGTH_ONLY:
+        allowed = "'length' or 'time' with this algorithm; a_star, modified_a_star, chs and taut take 'joint_travel'"
+        table.reject("objective", objective, allowed)
     return PlannerSpec(
         algorithm=algorithm,
         neighbours=neighbours,
         subset=table.choice("subset", SUBSETS, "run"),
         seed=table.integer("seed", 1, at_least=0, at_most=2**32 - 1),
         moves=table.choice("moves", MOVES, "proved"),
-        objective=table.choice("objective", OBJECTIVES, "length"),
+        objective=objective,
         budget_s=table.number("budget_s", 3.0, at_least=0.1, at_most=3600.0),
     )
 

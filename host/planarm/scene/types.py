@@ -33,7 +33,7 @@ ROADMAP_ALGORITHMS: tuple[Algorithm, ...] = ("mpd_star_lite", "d_star_lite", "ro
 Subset = Literal["run", "expansion"]
 Moves = Literal["proved", "cells", "nodes"]
 Corners = Literal["blend", "stop"]
-Objective = Literal["length", "time"]
+Objective = Literal["length", "joint_travel", "time"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,8 +92,9 @@ class PlannerSpec:
     """The search: algorithm, neighbourhood, and how moves are checked.
 
     `subset` says how often Chaos A* draws its subset of the neighbours; `moves` "proved" proves every move free,
-    "nodes" checks grid nodes only, as the papers do. `objective` "time" goes on from the path found and optimises the
-    path itself for duration, for `budget_s` seconds.
+    "nodes" checks grid nodes only, as the papers do. `objective` "joint_travel" searches the least turning of the
+    joints; "time" the least time at their top speeds, and goes on from there to optimise the path itself for duration,
+    for `budget_s` seconds.
     """
 
     algorithm: Algorithm

@@ -26,6 +26,7 @@ from planarm.search.best_first import (
     load_kernels,
 )
 from planarm.search.bound import optimal_path, path_bound_cm
+from planarm.search.costed import Price, cheapest
 from planarm.search.draw import draw_subset
 from planarm.search.endpoints import ON_NODE_CM, Endpoint, endpoint
 from planarm.search.lattice import make_lattice, make_moves, node_at, nodes_cm, open_room
@@ -39,15 +40,20 @@ from planarm.workspace.free_map import FreeMap
 LEGAL: Final[dict[Moves, int]] = {"nodes": NODES, "cells": CELLS, "proved": PROOF}
 PULLED: Final = ("taut", "any_angle")
 THETA: Final = ("theta_star", "lazy_theta_star")
+PRICED: Final = ("a_star", "modified_a_star", "chs", "taut", "any_angle")
+"""Algorithms that can search by another price than length: those that use a whole stencil."""
 FEW_MOVES: Final = 8
 """With no more moves than this the search looks itself for where not all have to be tried."""
 
 
-def find_path(free_map: FreeMap, start_cm: Point, goal_cm: Point, planner: PlannerSpec) -> SearchResult:
+def find_path(
+    free_map: FreeMap, start_cm: Point, goal_cm: Point, planner: PlannerSpec, price: Price | None = None
+) -> SearchResult:
     """Search a shortest path of the end effector from start to goal on the map's nodes.
 
     A start or goal that is no node is joined to the nearest free node that a proved straight move leads to, whatever
-    `planner.moves` says.
+    `planner.moves` says. With a price the cheapest path is searched instead, by the algorithms in PRICED; it is not
+    pulled taut, which would shorten it and make it dearer.
 
     Raises:
         ValueError: the planner's algorithm has no such neighbourhood.
@@ -61,19 +67,37 @@ def find_path(free_map: FreeMap, start_cm: Point, goal_cm: Point, planner: Plann
         if end.problem:
             return SearchResult(status, end.problem, None, 0, 0, perf_counter() - begin_s)
     lattice = make_lattice(free_map, border=int(np.abs(offsets).max()))
-    found = _search(free_map, lattice, offsets, planner, start, goal)
+    priced = price is not None and planner.algorithm in PRICED
+    if priced and price is not None:
+        found, cost = _search_priced(free_map, lattice, offsets, planner, (start, goal), price)
+    else:
+        found, cost = _search(free_map, lattice, offsets, planner, start, goal), None
     if not len(found.nodes):
         reason = _why_no_path(free_map, offsets, planner, start, goal, found)
         took_s = perf_counter() - begin_s
         return SearchResult(SearchStatus.NO_PATH, reason, None, found.expanded, found.generated, took_s)
     path = _path(free_map, lattice, found, start, goal)
-    if planner.algorithm in PULLED and planner.moves != "nodes":
+    if planner.algorithm in PULLED and planner.moves != "nodes" and not priced:
         path = _pulled(free_map, lattice, path, planner)
-    if planner.algorithm == "any_angle" and planner.moves != "nodes":
+    if planner.algorithm == "any_angle" and planner.moves != "nodes" and not priced:
         path = optimal_path(free_map, path, start, goal, planner) or path
     took_s = perf_counter() - begin_s
     bound_cm = path_bound_cm(free_map, path, start, goal, planner)
-    return SearchResult(SearchStatus.FOUND, "", path, found.expanded, found.generated, took_s, bound_cm)
+    return SearchResult(SearchStatus.FOUND, "", path, found.expanded, found.generated, took_s, bound_cm, cost)
+
+
+def _search_priced(
+    free_map: FreeMap,
+    lattice: Lattice,
+    offsets: Offsets,
+    planner: PlannerSpec,
+    ends: tuple[Endpoint, Endpoint],
+    price: Price,
+) -> tuple[Found, float]:
+    """Search the cheapest path from the start's node to the goal's; return it and its cost."""
+    nodes = [node_at(lattice, end.column, end.row) for end in ends]
+    rules = Rules(LEGAL[planner.moves], 0, 0)
+    return cheapest(lattice, make_moves(offsets, lattice), rules, free_map.world, nodes[0], nodes[1], price)
 
 
 def _search(

@@ -33,6 +33,8 @@ class SearchResult:
     """Wall time of the search in seconds, without compiling or loading its kernels, and without the bound."""
     bound_cm: float = 0.0
     """No path on this map with the same rule for moves is shorter (docs/planners.md: which paths); 0 for no path."""
+    cost: float | None = None
+    """Where the objective is not the length: sum over the moves, rad of joint travel or s at the joints' top speeds."""
 
     @property
     def gap(self) -> float:

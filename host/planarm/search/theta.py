@@ -44,7 +44,7 @@ def _search(
     expanded, generated = 0, 1
     while size > 0:
         node = heap_node[0]
-        size = _remove_first(heap_f, heap_node, size)
+        size = heap_remove_first(heap_f, heap_node, size)
         if closed[node]:
             continue
         x, y, parent = float(node % width), float(node // width), before[node]
@@ -79,7 +79,7 @@ def _search(
                 g[to], before[to] = through, source
                 if size == heap_f.size:
                     heap_f, heap_node = np.append(heap_f, heap_f), np.append(heap_node, heap_node)
-                _insert(heap_f, heap_node, size, through + leg_cells(to_x, to_y, goal_x, goal_y), to)
+                heap_insert(heap_f, heap_node, size, through + leg_cells(to_x, to_y, goal_x, goal_y), to)
                 size += 1
                 generated += 1
     if not closed[goal]:
@@ -88,7 +88,7 @@ def _search(
 
 
 @kernel
-def _insert(heap_f: Floats, heap_node: Ints, size: int, f: float, node: int) -> None:
+def heap_insert(heap_f: Floats, heap_node: Ints, size: int, f: float, node: int) -> None:
     """Put an entry into a binary heap of `size` entries."""
     place = size
     while place > 0 and heap_f[(place - 1) >> 1] > f:
@@ -98,7 +98,7 @@ def _insert(heap_f: Floats, heap_node: Ints, size: int, f: float, node: int) -> 
 
 
 @kernel
-def _remove_first(heap_f: Floats, heap_node: Ints, size: int) -> int:
+def heap_remove_first(heap_f: Floats, heap_node: Ints, size: int) -> int:
     """Take the first entry off a binary heap; return the number of entries left."""
     size -= 1
     f, node, place, child = heap_f[size], heap_node[size], 0, 1
