@@ -4,6 +4,7 @@
     python firmware/build.py pio        the same through `pio run`, without PlatformIO's registry
     python firmware/build.py native     the core as a shared library for this computer, for tests
     python firmware/build.py test       the core's own tests through `pio test`, sanitizers on
+    python firmware/build.py fuzz       libFuzzer's target, by clang: OUT/fuzz_line [CORPUS] [-runs=N]
     python firmware/build.py release    writes release/uno.hex and release/uno.json
     python firmware/build.py check      proves that both builds equal release/uno.hex, byte for byte
 
@@ -37,6 +38,7 @@ PLATFORM_LINK = ("-mmcu=atmega328p",)
 
 PIO_TIMEOUT_S = 50  # a package that is missing is asked for over and over; the store below has them all
 NATIVE_FLAGS = ("-O1", "-g", "-fPIC", "-fsanitize=undefined", "-fno-sanitize-recover=all")
+FUZZ_FLAGS = ("-Wno-sign-conversion", "-O1", "-g", "-fsanitize=fuzzer,address,undefined", "-fno-sanitize-recover=all")
 
 
 class BuildError(Exception):
@@ -173,6 +175,16 @@ def build_native(out: Path) -> Path:
     return library
 
 
+def build_fuzz(out: Path) -> Path:
+    """Build libFuzzer's target for the frame receiver, the dispatcher and what they lead to; return the program."""
+    flags, sources = read_settings("native")
+    kept = [flag for flag in flags if not flag.startswith(("-fsanitize", "-fno-sanitize", "-O", "-g"))]
+    out.mkdir(parents=True, exist_ok=True)
+    program = out / "fuzz_line"
+    run(["clang++", *kept, *FUZZ_FLAGS, "-o", str(program), "fuzz/fuzz_line.cpp", *map(str, sources)])
+    return program
+
+
 def compiler_version() -> str:
     """Return avr-gcc's first line, such as `avr-gcc (GCC) 5.4.0`."""
     return run(["avr-gcc", "--version"]).splitlines()[0]
@@ -234,6 +246,7 @@ COMMANDS: dict[str, Callable[[Path], Path | str]] = {
     "pio": build_pio,
     "native": build_native,
     "test": test_pio,
+    "fuzz": build_fuzz,
     "release": release,
     "check": check,
 }

@@ -1,0 +1,89 @@
+"""libFuzzer on the core: bytes, frames, inputs and time in any order break no rule of the pins and do no harm."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from firmware_board import run_of, segment_of
+from planarm_wire.codec import encode
+from planarm_wire.messages import (
+    EMERGENCY_CODE,
+    HOLD_CODE,
+    Config,
+    Enable,
+    Home,
+    HostMessage,
+    Override,
+    PinMap,
+    Query,
+    Resume,
+    Segments,
+    Start,
+    Stop,
+)
+
+BUILD = Path(__file__).parents[2] / "firmware" / "build.py"
+LINE, FRAME, TIME, INPUTS = range(4)
+
+
+def record(kind: int, data: bytes) -> bytes:
+    """One record of a script (firmware/fuzz/fuzz_line.cpp)."""
+    return bytes([kind | len(data) << 2]) + data
+
+
+def frame(message: HostMessage) -> bytes:
+    code, payload = encode(message)
+    return bytes([FRAME | len(payload) << 2, code]) + payload
+
+
+def wait(ms: float) -> bytes:
+    return bytes([TIME]) + int(ms * 16_000 / 64).to_bytes(2, "little")
+
+
+def scripts() -> list[bytes]:
+    """A motion that is held, starved, stopped; homing; an emergency: where the fuzzer begins."""
+    away = segment_of(60_000, run_of(60, interval=900), run_of(150, interval=390))
+    back = segment_of(60_000, run_of(60, interval=900, positive=False), run_of(30, interval=1900))
+    awake = frame(Enable(1)) + wait(25)
+    moving = awake + frame(Segments(200, 200, 1, (away, back))) + frame(Start(20_000))
+    return [
+        moving + wait(30),
+        moving + record(LINE, bytes([HOLD_CODE])) + wait(9) + frame(Resume()) + wait(9),
+        moving + frame(Override(30)) + wait(9) + frame(Stop(1)) + wait(9) + frame(Query()),
+        moving + wait(2) + record(LINE, bytes([EMERGENCY_CODE] * 3)) + wait(2),
+        frame(Config(PinMap.OWN, 2, 1, 0b1100, 0, 0, 56, (160_000, 160_000)))
+        + awake
+        + frame(Home(0, 1, 3000, 9000, 400, 100, 0))
+        + wait(20)
+        + bytes([INPUTS, 1])
+        + wait(20),
+    ]
+
+
+@pytest.mark.skipif(shutil.which("clang++") is None, reason="clang++ is not installed: no libFuzzer")
+def test_no_input_breaks_a_rule(tmp_path: Path, sized: Callable[[int, int], int]) -> None:
+    made = subprocess.run(
+        [sys.executable, str(BUILD), "fuzz", "--out", str(tmp_path)], capture_output=True, text=True, check=False
+    )
+    if "libclang_rt.fuzzer" in made.stderr:
+        pytest.skip("clang++ has no libFuzzer here (Debian: libclang-rt-dev)")
+    assert made.returncode == 0, made.stderr
+    corpus = tmp_path / "corpus"
+    corpus.mkdir()
+    for number, script in enumerate(scripts()):
+        (corpus / f"script_{number}").write_bytes(script)
+    runs = sized(1500, 300_000)
+    done = subprocess.run(
+        [str(tmp_path / "fuzz_line"), str(corpus), f"-runs={runs}", "-seed=1", "-max_len=600", "-len_control=0"],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr[-4000:]
