@@ -21,7 +21,8 @@ from test_firmware_stretch import FAST, SEGMENT_TICKS, Player  # noqa: E402
 from test_firmware_uno import Streamer, fast  # noqa: E402
 
 from firmware_board import LEAD_TICKS, Board, EmulatedFirmware, Schedule, end_motion  # noqa: E402 - the tests' board
-from planarm_wire.codec import encode, encoded_bytes  # noqa: E402
+from planarm.stepping.segments import Coding, compress  # noqa: E402
+from planarm_wire.codec import encode  # noqa: E402
 from planarm_wire.framing import encode_frame  # noqa: E402
 from planarm_wire.messages import (  # noqa: E402
     BAUD,
@@ -31,15 +32,14 @@ from planarm_wire.messages import (  # noqa: E402
     HOLD_CODE,
     HOST_WINDOW_BYTES,
     MIN_INTERVAL_TICKS,
-    QUEUE_BYTES,
-    QUEUE_FRAME_BYTES,
+    SLICE_TICKS,
     STEP_PINS,
     TICKS_HZ,
     Fault,
     Segments,
     Start,
 )
-from stretch_motion import Profile  # noqa: E402
+from reference_motion import least_held_ticks, reference_train  # noqa: E402
 
 IMAGE = ROOT / "firmware" / "release" / "uno.hex"
 TOLD = json.loads((ROOT / "firmware" / "release" / "uno.json").read_text(encoding="utf-8"))
@@ -140,13 +140,13 @@ def saturated(name: str, interval: int, ratio: float, seconds: float) -> tuple[s
 
 def streamed(name: str, interval: int, ratio: float) -> tuple[str, str]:
     """Steps at constant rates, streamed within the host's window of 112 bytes."""
-    motion = end_motion(fast(interval, ratio, 64_000, 250))
+    motion = end_motion(fast(interval, ratio, 4 * SLICE_TICKS, 70))
     board = Board(EmulatedFirmware(IMAGE))
     board.get_ready()
     for segment in motion[:16]:
         board.ask(Segments(0, 0, 0, (segment,)))
     board.ask(Start(LEAD_TICKS))
-    status = Streamer(board, motion[16:], busy_line=True).run(len(motion), 64_000 * 300)
+    status = Streamer(board, motion[16:], busy_line=True).run(len(motion), 4 * SLICE_TICKS * 90)
     told = deviation(board, motion) if status.fault is Fault.NONE else f"{status.fault.name}"
     return name, f"{told}; {status.overruns + status.ring_full} bytes lost"
 
@@ -212,15 +212,10 @@ def emergency_latency() -> tuple[str, str]:
 
 
 def ring() -> tuple[str, str]:
-    """Path time that the queue holds of a hard motion: two joints, 20 k steps/s."""
-    motion = Profile((20_000.0, 12_360.0), (400_000.0, 400_000.0), 0.8, 30).motion()
-    used = count = 0
-    for head, first, second in zip(motion.heads[::2], motion.segments[::2], motion.segments[1::2], strict=False):
-        used += encoded_bytes(Segments(*head, (first,))) + encoded_bytes(second) + QUEUE_FRAME_BYTES
-        if used > QUEUE_BYTES:
-            break
-        count += 2
-    return "path time in the queue, two joints at 20 k steps/s", f"{count * SEGMENT_TICKS / TICKS_HZ * 1000:.0f} ms"
+    """Path time that the queue holds of the hard motion, wherever it is filled."""
+    train, axes = reference_train()
+    held_ticks = least_held_ticks(compress(train, Coding.of(axes)).segments)
+    return "path time in the queue, tests/data/reference_motion.toml", f"{held_ticks / TICKS_HZ * 1000:.0f} ms at least"
 
 
 if __name__ == "__main__":

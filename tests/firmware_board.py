@@ -315,12 +315,12 @@ class Board:
 def run_of(
     steps: int, *, first: int = 1000, interval: int = 1000, add: int = 0, positive: bool = True, fraction: int = 0
 ) -> Move:
-    """A move with whole-tick interval and change, and a fraction of 2^-16 ticks more in the interval."""
+    """A move with whole-tick interval and change, and a fraction of 2^-8 ticks more in the interval."""
     if steps == 0:
         return REST
     if steps == 1:
         return Move(2 + positive, first, 0, 0)
-    return Move(2 * steps + positive, first, (interval << 16) + fraction, add << 16)
+    return Move(2 * steps + positive, first, (interval << 8) + fraction, add << 16)
 
 
 def segment_of(duration: int, *moves: Move, last: bool = False) -> Segment:

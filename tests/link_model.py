@@ -445,5 +445,5 @@ def _move(chance: random.Random, ticks: int) -> Move:
     if steps == 1:
         return Move(steps_dir, first)
     room = min((ticks - 2 * margin - 20) // steps, 50_000)
-    interval = chance.randrange((MIN_INTERVAL_TICKS + 10) << 16, room << 16)
+    interval = chance.randrange((MIN_INTERVAL_TICKS + 10) << 8, room << 8)
     return Move(steps_dir, first, interval, chance.randrange(-(10 << 16) // steps, (10 << 16) // steps))

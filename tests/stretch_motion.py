@@ -90,13 +90,13 @@ def _move(phase: float, begin_hz: float, end_hz: float, positive: bool) -> tuple
         return Move(2 + positive, ticks[0]), total - count
     span = (ticks[-1] - ticks[0]) << 16
     if count == 2:
-        return Move(4 + positive, ticks[0], span, 0), total - count
+        return Move(4 + positive, ticks[0], span >> 8, 0), total - count
     middle = ticks[count // 2] - ticks[0]
     n, m = count - 1, count // 2
     # The quadratic through the first, the middle and the last step.
     add = round(((span / n) - (middle << 16) / m) / (n / 2 - m / 2))
-    interval = round(span / n - add * (n - 1) / 2)
-    return Move(2 * count + positive, ticks[0], interval, add), total - count
+    interval_q8 = round((span / n - add * (n - 1) / 2) / 256)
+    return Move(2 * count + positive, ticks[0], interval_q8, add), total - count
 
 
 def _needs(
@@ -186,7 +186,7 @@ def largest_accelerations(motion: HoldableMotion, stretches: Sequence[int]) -> l
             if move.steps_dir < 6:
                 continue
             count = move.steps_dir >> 1
-            intervals = [(move.interval_q16 + i * move.add_q16) / ONE for i in (0, count - 2)]
+            intervals = [(256 * move.interval_q8 + i * move.add_q16) / ONE for i in (0, count - 2)]
             speeds = [1 / interval for interval in intervals]
             bend = (speeds[1] - speeds[0]) / (step_ticks(move)[-1] - step_ticks(move)[0])
             s0, s1 = stretches[k] / ONE, stretches[k + 1] / ONE

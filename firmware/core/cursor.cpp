@@ -44,6 +44,27 @@ void fit(Piece& piece, uint32_t span_ticks, const Intervals& wanted) {
     piece.interval_q16 = shrinks ? mean_q16 + half : mean_q16 - half;
 }
 
+// About steps part / whole, for 0 < part <= whole: bit by bit, in 14 bits of both.
+uint8_t share(uint8_t steps, uint32_t part, uint32_t whole) {
+    while (whole > 0x3FFF) {
+        whole >>= 1;
+        part >>= 1;
+    }
+    const uint16_t term = static_cast<uint16_t>(part);
+    const uint16_t divisor = static_cast<uint16_t>(whole);
+    uint16_t rest = 0;
+    uint8_t quotient = 0;
+    for (uint8_t bit = 0x80; bit != 0; bit = static_cast<uint8_t>(bit >> 1)) {
+        rest = static_cast<uint16_t>(2 * rest + ((steps & bit) != 0 ? term : 0u));
+        quotient = static_cast<uint8_t>(2 * quotient);
+        while (rest >= divisor) {
+            rest = static_cast<uint16_t>(rest - divisor);
+            ++quotient;
+        }
+    }
+    return quotient;
+}
+
 }  // namespace
 
 void Cursor::reset() {
@@ -62,6 +83,7 @@ void Cursor::begin(const Move& move) {
 bool Cursor::is_calm(const Slice& slice, uint32_t start_stop_ticks) const {
     if (!has_step_before(slice.end_path())) return true;
     uint32_t least = has_moved_ ? at_.high - last_path_ticks_ : 0xFFFFFFFF;
+    if (slice.is_plain() && least < start_stop_ticks) return false;  // as a rule
     if (left_ > 1) {
         const uint32_t change = multiply(static_cast<uint32_t>(add_q16_ < 0 ? -add_q16_ : add_q16_),
                                          static_cast<uint16_t>(left_ - 2))
@@ -73,21 +95,32 @@ bool Cursor::is_calm(const Slice& slice, uint32_t start_stop_ticks) const {
     return multiply_q16(least, slice.least_stretch()) >= start_stop_ticks;
 }
 
-// Halving; a run has at most MAX_RUN_STEPS.
-uint8_t Cursor::steps_before(uint32_t path_ticks, bool ends_segment) const {
-    uint8_t fits = 1;
-    uint8_t most =
+// Mostly the guess is right, and one look at each side of it shows that; else by halving.
+uint8_t Cursor::steps_before(uint32_t path_ticks, bool ends_segment, Fixed48& to_last) const {
+    const uint8_t most =
         left_ < step_engine::MAX_RUN_STEPS ? static_cast<uint8_t>(left_) : step_engine::MAX_RUN_STEPS;
-    if (ends_segment) return most;
-    while (fits < most) {
-        const uint8_t middle = static_cast<uint8_t>(fits + static_cast<uint8_t>(most - fits + 1) / 2);
-        Fixed48 last = run_time(static_cast<uint8_t>(middle - 1), interval_q16_, add_q16_);
-        add_to(last, at_);
-        if (last.high < path_ticks) {
-            fits = middle;
+    to_last = run_time(static_cast<uint8_t>(most - 1), interval_q16_, add_q16_);
+    if (ends_segment || reaches(to_last) < path_ticks) return most;
+    uint8_t fits = 1;
+    uint8_t fails = most;
+    uint8_t probe =
+        static_cast<uint8_t>(1 + share(static_cast<uint8_t>(most - 1), path_ticks - at_.high, to_last.high));
+    to_last = {0, 0};
+    if (probe <= fits) probe = 2;
+    if (probe >= fails) probe = static_cast<uint8_t>(fails - 1);
+    for (uint8_t turn = 0; fails - fits > 1; ++turn) {
+        const Fixed48 time = run_time(static_cast<uint8_t>(probe - 1), interval_q16_, add_q16_);
+        const bool before = reaches(time) < path_ticks;
+        if (before) {
+            fits = probe;
+            to_last = time;
         } else {
-            most = static_cast<uint8_t>(middle - 1);
+            fails = probe;
         }
+        const uint8_t beside = static_cast<uint8_t>(before ? probe + 1 : probe - 1);
+        const bool inside = fits < beside && beside < fails;
+        const uint8_t middle = static_cast<uint8_t>(fits + static_cast<uint8_t>(fails - fits) / 2);
+        probe = turn < 2 && inside ? beside : middle;
     }
     return fits;
 }
@@ -108,9 +141,8 @@ Piece Cursor::take(const Slice& slice) {
     piece.fraction = at_.low;
     piece.interval_q16 = interval_q16_;
     piece.add_q16 = static_cast<uint32_t>(add_q16_);
-    piece.steps = steps_before(slice.end_path(), slice.ends_segment());
-
-    Fixed48 to_last = run_time(static_cast<uint8_t>(piece.steps - 1), interval_q16_, add_q16_);
+    Fixed48 to_last;
+    piece.steps = steps_before(slice.end_path(), slice.ends_segment(), to_last);
     const uint16_t first_path = slice.path_of(at_.high);
     piece.first_ticks = slice.ticks_at(first_path);
     uint32_t last_ticks = piece.first_ticks;

@@ -34,7 +34,12 @@ class Cursor {
     void shift(uint32_t ticks) { last_ticks_ += ticks; }
 
   private:
-    uint8_t steps_before(uint32_t path_ticks, bool ends_segment) const;
+    // How many steps the next run makes before a path time, and the time from the first to the last of them.
+    uint8_t steps_before(uint32_t path_ticks, bool ends_segment, Fixed48& to_last) const;
+    // The path time of a step so long after the next one.
+    uint32_t reaches(Fixed48 time) const {
+        return at_.high + time.high + (static_cast<uint16_t>(at_.low + time.low) < time.low ? 1 : 0);
+    }
     void advance(uint8_t steps, Fixed48 to_last);
 
     Fixed48 at_;  // path time of the next step, from the segment's start

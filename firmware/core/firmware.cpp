@@ -19,12 +19,16 @@ namespace firmware {
 
 namespace {
 
+// While a motion runs, what is not its business is looked at in one pass of so many.
+constexpr uint8_t PASSES_A_LOOK = 4;
+
 // Bytes decoded in one pass, so that the motion is looked after often.
 constexpr uint8_t BYTES_A_PASS = 8;
 
 FrameReceiver receiver;
 uint8_t reply_bytes[reply::MAX_ENCODED];
 uint8_t seen_holds;
+uint8_t passes;
 
 // Spreads counts that follow each other over all 32 bits; every step can be undone, so different counts stay
 // different. The multiplier is 2^32 over the golden ratio, made odd.
@@ -110,12 +114,16 @@ void serve_limits(uint32_t now_ticks) {
     }
 }
 
-void serve_signals(uint32_t now_ticks) {
+void serve_hold(uint32_t now_ticks) {
     const uint8_t holds = hal::hold_count();
-    if (holds != seen_holds) {
-        seen_holds = holds;
-        tell(supervisor::Event::HOLD, now_ticks);
-    }
+    if (holds == seen_holds) return;
+    seen_holds = holds;
+    tell(supervisor::Event::HOLD, now_ticks);
+}
+
+void serve_rest(uint32_t now_ticks) {
+    if (supervisor::state() == wire::State::RUNNING && ++passes % PASSES_A_LOOK != 0) return;
+    serve_homing(now_ticks);
     serve_limits(now_ticks);
     if (supervisor::state() == wire::State::READY && power::is_idle_too_long(now_ticks)) {
         tell(supervisor::Event::RELEASE, now_ticks);
@@ -160,8 +168,8 @@ void pass() {
     serve_emergency(now_ticks);  // before the motion wonders where its interrupts are
     serve_motion(now_ticks);
     if (motion::is_urgent()) return;
-    serve_homing(now_ticks);
-    serve_signals(now_ticks);
+    serve_hold(now_ticks);
+    serve_rest(now_ticks);
     hal::journal_serve();
     if (reply()) return;
     if (session::is_busy()) {

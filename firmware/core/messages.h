@@ -11,7 +11,7 @@ namespace wire {
 // Both ends must have the same.
 constexpr uint8_t PROTOCOL_VERSION = 2;
 // Of the specification without its wording.
-constexpr uint32_t SPEC_HASH = 0x6578D960UL;
+constexpr uint32_t SPEC_HASH = 0x15F1076AUL;
 
 // Ends every frame.
 constexpr uint8_t DELIMITER = 0x7E;
@@ -56,7 +56,8 @@ constexpr uint8_t HOST_WINDOW_BYTES = 112;
 constexpr uint16_t QUEUE_BYTES = 896U;
 // Bytes that each queued SEGMENTS frame takes besides its payload.
 constexpr uint8_t QUEUE_FRAME_BYTES = 1;
-// Least time between two steps of one joint; min_dir_setup_ticks more where it turns round.
+// Least time between two steps of one joint, 69,500 steps/s; min_dir_setup_ticks more where it
+// turns round. Both joints together: 130,000 steps/s.
 constexpr uint8_t MIN_INTERVAL_TICKS = 230;
 // Unit of a segment's need, 2.048 ms.
 constexpr uint16_t NEED_UNIT_TICKS = 32768U;
@@ -75,9 +76,9 @@ constexpr uint8_t WATCHDOG_MS = 250;
 constexpr uint32_t DEBOUNCE_TICKS = 80000UL;
 // Largest interval inside a run of more than one step; longer gaps need a segment of their own.
 constexpr uint16_t MAX_INTERVAL_TICKS = 60000U;
-// Longest segment in which a joint may be faster than its start-stop speed, 4.1 ms. The device
-// changes the path clock's rate from segment to segment.
-constexpr uint32_t CALM_SEGMENT_TICKS = 65536UL;
+// The device cuts segments into equal slices of at most 3.9 ms, the last shorter by the rounding up
+// of the others. The path clock's rate changes from slice to slice.
+constexpr uint16_t SLICE_TICKS = 62500U;
 // Longest segment, about 67 s.
 constexpr uint32_t MAX_SEGMENT_TICKS = 1073741823UL;
 // Most steps of one joint in one segment.

@@ -16,8 +16,7 @@ namespace path_clock {
 
 constexpr uint32_t ONE = 0x10000;  // a stretch of 1
 constexpr uint32_t MAX_STRETCH = static_cast<uint32_t>(wire::MAX_STRETCH) << 16;
-// A slice is short enough for a product with 16 bits, and for a change of mind.
-constexpr uint32_t MAX_SLICE_TICKS = wire::CALM_SEGMENT_TICKS;
+static_assert(wire::SLICE_TICKS <= 0x10000, "path times in a slice have 16 bits");
 
 // The value of a rate code, in 2^-32 a tick.
 uint32_t rate_value(uint8_t code);

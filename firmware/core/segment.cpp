@@ -31,7 +31,9 @@ void read_move(Reader& reader, Move& move) {
     // More steps than fit are kept as too many, for check_move to refuse.
     move.steps = steps > wire::MAX_SEGMENT_STEPS ? 0xFFFF : static_cast<uint16_t>(steps);
     move.first_ticks = steps >= 1 ? reader.varuint() : 0;
-    move.interval_q16 = steps >= 2 ? reader.varuint() : 0;
+    const uint32_t interval_q8 = steps >= 2 ? reader.varuint() : 0;
+    // What does not fit is kept as too long, for check_move to refuse.
+    move.interval_q16 = interval_q8 > 0xFFFFFF ? 0xFFFFFFFF : interval_q8 << 8;
     move.add_q16 = steps >= 2 ? reader.varint() : 0;
 }
 

@@ -156,7 +156,13 @@ void reset() {
     }
 }
 
-bool has_room(uint8_t joint) { return rings[joint].free->next != rings[joint].oldest; }
+// Executed runs are taken back only when their room is needed.
+bool has_room(uint8_t joint) {
+    const Ring& ring = rings[joint];
+    if (ring.free->next != ring.oldest) return true;
+    take_back(joint);
+    return ring.free->next != ring.oldest;
+}
 
 void append(uint8_t joint, const Piece& piece) {
     Ring& ring = rings[joint];
@@ -182,7 +188,6 @@ bool serve(uint32_t now_ticks) {
         if (step_missed == 0) step_missed = STEP_MISSED_AT_START | hal::step_interrupts_on();
         hal::steps_off();
     }
-    for (uint8_t joint = 0; joint < wire::JOINTS; ++joint) take_back(joint);
     return step_missed == 0;
 }
 
@@ -253,7 +258,10 @@ Position position() {
 
 void set_dir_inverted(uint8_t joint, bool inverted) { rings[joint].dir_inverted = inverted; }
 
-void set_position(uint8_t joint, int32_t usteps) { rings[joint].position_usteps = usteps; }
+void set_position(uint8_t joint, int32_t usteps) {
+    take_back(joint);
+    rings[joint].position_usteps = usteps;
+}
 
 }  // namespace step_engine
 }  // namespace planarm

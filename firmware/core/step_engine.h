@@ -60,7 +60,7 @@ struct Position {
 // Back to rest with empty rings; positions 0. For start-up, before interrupts are on.
 void reset();
 
-// True while `joint` can take another run.
+// True while `joint` can take another run. Takes executed ones back.
 bool has_room(uint8_t joint);
 
 // A run to be appended.
@@ -80,8 +80,7 @@ void append(uint8_t joint, const Piece& piece);
 // Sets which level of DIR is the positive direction; the joint must be at rest.
 void set_dir_inverted(uint8_t joint, bool inverted);
 
-// Starts idle joints whose next run is due soon and takes executed runs back. False when a step came too
-// late.
+// Starts idle joints whose next run is due soon. False when a step came too late.
 bool serve(uint32_t now_ticks);
 
 // True from a missed step to the stop that follows.

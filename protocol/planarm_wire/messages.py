@@ -13,7 +13,7 @@ from planarm_wire.layout import END, Field
 
 PROTOCOL_VERSION: Final = 2
 """Both ends must have the same."""
-SPEC_HASH: Final = 0x6578D960
+SPEC_HASH: Final = 0x15F1076A
 """Hash of the specification without its wording."""
 DELIMITER: Final = 0x7E
 """Ends every frame."""
@@ -57,7 +57,10 @@ QUEUE_BYTES: Final = 896
 QUEUE_FRAME_BYTES: Final = 1
 """Bytes that each queued SEGMENTS frame takes besides its payload."""
 MIN_INTERVAL_TICKS: Final = 230
-"""Least time between two steps of one joint; min_dir_setup_ticks more where it turns round."""
+"""Least time between two steps of one joint, 69,500 steps/s; min_dir_setup_ticks more where it turns round.
+
+Both joints together: 130,000 steps/s.
+"""
 NEED_UNIT_TICKS: Final = 32_768
 """Unit of a segment's need, 2.048 ms."""
 MAX_STRETCH: Final = 4_096
@@ -74,10 +77,10 @@ DEBOUNCE_TICKS: Final = 80_000
 """A limit switch counts when it stays so for this long, 5 ms."""
 MAX_INTERVAL_TICKS: Final = 60_000
 """Largest interval inside a run of more than one step; longer gaps need a segment of their own."""
-CALM_SEGMENT_TICKS: Final = 65_536
-"""Longest segment in which a joint may be faster than its start-stop speed, 4.1 ms.
+SLICE_TICKS: Final = 62_500
+"""The device cuts segments into equal slices of at most 3.9 ms, the last shorter by the rounding up of the others.
 
-The device changes the path clock's rate from segment to segment.
+The path clock's rate changes from slice to slice.
 """
 MAX_SEGMENT_TICKS: Final = 1_073_741_823
 """Longest segment, about 67 s."""
@@ -334,8 +337,8 @@ RESULT_WORDS: Final[dict[Result, Words]] = {
 class Move:
     """One joint's steps in a segment, in closed form.
 
-    Step n (0 .. steps - 1) rises first_ticks + floor((n I + n (n - 1) / 2 A) / 2^16) ticks after the segment's
-    start, where I = interval_q16 and A = add_q16.
+    Step n (0 .. steps - 1) rises first_ticks + floor((256 n I + n (n - 1) / 2 A) / 2^16) ticks after the segment's
+    start, where I = interval_q8 and A = add_q16.
 
     On the wire 1 to 20 bytes.
     """
@@ -347,8 +350,8 @@ class Move:
     """
     first_ticks: int = 0
     """First rising edge after the segment's start. (ticks, varuint, only when steps_dir >= 2, else 0)"""
-    interval_q16: int = 0
-    """Interval from step 0 to step 1. (ticks/2^16, varuint, only when steps_dir >= 4, else 0)"""
+    interval_q8: int = 0
+    """Interval from step 0 to step 1. (ticks/2^8, varuint, only when steps_dir >= 4, else 0)"""
     add_q16: int = 0
     """What each interval has more than the one before. (ticks/2^16, varint, only when steps_dir >= 4, else 0)"""
 
@@ -439,7 +442,7 @@ class Segments:
     fast: int
     """Rate code: largest speeding up of the path clock. (u8)"""
     need: int
-    """Path time needed to come to rest from the first segment's start, rounded up; 255: that or more.
+    """Path time needed to come to rest, the most from any slice's start in the message, rounded up; 255: that or more.
 
     (need_unit_ticks, u8)
     """
@@ -725,7 +728,7 @@ LAYOUTS: Final[dict[type[Message | Struct], tuple[Field, ...]]] = {
     Move: (
         Field("steps_dir", "varuint"),
         Field("first_ticks", "varuint", when=("steps_dir", 2)),
-        Field("interval_q16", "varuint", when=("steps_dir", 4)),
+        Field("interval_q8", "varuint", when=("steps_dir", 4)),
         Field("add_q16", "varint", when=("steps_dir", 4)),
     ),
     Segment: (

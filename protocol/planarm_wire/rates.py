@@ -22,6 +22,8 @@ RATE_UNIT_PER_S: Final = TICKS_HZ / 2**32
 """What v = 1 means, 0.0037 1/s."""
 MAX_CODE: Final = 0xFF
 MANTISSAS: Final = 16
+MESSAGE_SEGMENTS: Final = 2
+"""Most segments that hosts put into one message: its head, the least of their allowances, holds for all of them."""
 
 
 def rate_value(code: int) -> int:

@@ -1,10 +1,10 @@
 """The moments of the steps, in exact integers: the plain reference for every other expansion.
 
-Step n of a move with count N, I = interval_q16 and A = add_q16 rises, counted from its segment's start, at
+Step n of a move with count N, I = interval_q8 and A = add_q16 rises, counted from its segment's start, at
 
-    T_n = first_ticks + floor((n I + n (n - 1) / 2 A) / 2^16)        n = 0 .. N - 1
+    T_n = first_ticks + floor((256 n I + n (n - 1) / 2 A) / 2^16)        n = 0 .. N - 1
 
-which is one step every I / 2^16 ticks, with each interval A / 2^16 ticks longer than the one before it.
+which is one step every I / 2^8 ticks, with each interval A / 2^16 ticks longer than the one before it.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ def expand_moves(segment: Segment) -> tuple[tuple[int, ...], ...]:
 
 def step_ticks(move: Move) -> tuple[int, ...]:
     """Return the ticks of the move's steps, relative to its segment's start."""
-    interval, add = move.interval_q16, move.add_q16
+    interval, add = move.interval_q8 << 8, move.add_q16
     return tuple(move.first_ticks + ((n * interval + n * (n - 1) // 2 * add) >> 16) for n in range(step_count(move)))
 
 

@@ -45,6 +45,7 @@ from planarm_wire.messages import (
 LEAST, MOST = MIN_INTERVAL_TICKS, MAX_INTERVAL_TICKS
 BACK = MIN_INTERVAL_TICKS + MIN_DIR_SETUP_TICKS
 ONE = 1 << 16
+Q8 = 1 << 8
 
 
 @pytest.fixture
@@ -58,32 +59,32 @@ GOOD = {
     "shortest": segment_of(1),
     "longest": segment_of(MAX_SEGMENT_TICKS),
     "last step on the last tick": segment_of(3001, run_of(3, first=1000)),
-    "most steps": segment_of(MAX_SEGMENT_STEPS * 800, Move(2 * MAX_SEGMENT_STEPS, 0, LEAST << 16, 0)),
+    "most steps": segment_of(MAX_SEGMENT_STEPS * 800, Move(2 * MAX_SEGMENT_STEPS, 0, LEAST << 8, 0)),
     "least interval": segment_of(9000, run_of(9, interval=LEAST)),
     "largest interval": segment_of(10 * MOST, run_of(9, interval=MOST)),
     "down to the least interval": segment_of(20_000, run_of(12, interval=LEAST + 10, add=-1)),
     "up to the largest interval": segment_of(20 * MOST, run_of(12, interval=MOST - 10, add=1)),
     "change unused by two steps": segment_of(9000, run_of(2, interval=LEAST, add=-32768)),
-    "fraction carries into the last tick": segment_of(3001, Move(2 * 3, 1000, 1000 * ONE - 1, 2)),
+    "fraction carries into the last tick": segment_of(3001, Move(2 * 3, 1000, 1000 * Q8 - 1, 512)),
 }
 BAD = {
     "no duration": segment_of(0),
     "too long": segment_of(MAX_SEGMENT_TICKS + 1),
     "only step at the end": segment_of(1000, run_of(1, first=1000)),
     "last step at the end": segment_of(3000, run_of(3, first=1000)),
-    "too many steps": segment_of(MAX_SEGMENT_TICKS, Move(2 * (MAX_SEGMENT_STEPS + 1), 0, LEAST << 16, 0)),
-    "far too many steps": segment_of(MAX_SEGMENT_TICKS, Move(2**32 - 2, 0, LEAST << 16, 0)),
-    "below the least interval": segment_of(9000, Move(2 * 9, 0, LEAST * ONE - 1, 0)),
-    "above the largest interval": segment_of(20 * MOST, Move(2 * 9, 0, MOST * ONE + 1, 0)),
-    "falls below the least": segment_of(20_000, Move(2 * 12, 0, (LEAST + 10) * ONE, -ONE - 1)),
-    "rises above the largest": segment_of(20 * MOST, Move(2 * 12, 0, (MOST - 10) * ONE, ONE + 1)),
-    "interval wraps round once": segment_of(MAX_SEGMENT_TICKS, Move(2 * 18, 0, 1000 * ONE, 2**28)),
-    "interval wraps far": segment_of(MAX_SEGMENT_TICKS, Move(2 * MAX_SEGMENT_STEPS, 0, 1000 * ONE, 2**31 - 1)),
-    "interval wraps downwards": segment_of(MAX_SEGMENT_TICKS, Move(2 * 18, 0, 50_000 * ONE, -(2**28))),
-    "largest negative change": segment_of(MAX_SEGMENT_TICKS, Move(2 * 4, 0, 50_000 * ONE, -(2**31))),
-    "run longer than 2^30 ticks": segment_of(1000, Move(2 * MAX_SEGMENT_STEPS, 0, MOST * ONE, 0)),
+    "too many steps": segment_of(MAX_SEGMENT_TICKS, Move(2 * (MAX_SEGMENT_STEPS + 1), 0, LEAST << 8, 0)),
+    "far too many steps": segment_of(MAX_SEGMENT_TICKS, Move(2**32 - 2, 0, LEAST << 8, 0)),
+    "below the least interval": segment_of(9000, Move(2 * 9, 0, LEAST * Q8 - 1, 0)),
+    "above the largest interval": segment_of(20 * MOST, Move(2 * 9, 0, MOST * Q8 + 1, 0)),
+    "falls below the least": segment_of(20_000, Move(2 * 12, 0, (LEAST + 10) * Q8, -ONE - 1)),
+    "rises above the largest": segment_of(20 * MOST, Move(2 * 12, 0, (MOST - 10) * Q8, ONE + 1)),
+    "interval wraps round once": segment_of(MAX_SEGMENT_TICKS, Move(2 * 18, 0, 1000 * Q8, 2**28)),
+    "interval wraps far": segment_of(MAX_SEGMENT_TICKS, Move(2 * MAX_SEGMENT_STEPS, 0, 1000 * Q8, 2**31 - 1)),
+    "interval wraps downwards": segment_of(MAX_SEGMENT_TICKS, Move(2 * 18, 0, 50_000 * Q8, -(2**28))),
+    "largest negative change": segment_of(MAX_SEGMENT_TICKS, Move(2 * 4, 0, 50_000 * Q8, -(2**31))),
+    "run longer than 2^30 ticks": segment_of(1000, Move(2 * MAX_SEGMENT_STEPS, 0, MOST * Q8, 0)),
     "first step beyond 2^30": segment_of(1000, run_of(1, first=2**32 - 1)),
-    "second joint bad": segment_of(9000, run_of(2), Move(2 * 9, 0, LEAST * ONE - 1, 0)),
+    "second joint bad": segment_of(9000, run_of(2), Move(2 * 9, 0, LEAST * Q8 - 1, 0)),
 }
 
 
@@ -105,7 +106,7 @@ def test_segments_beyond_their_limits_are_faults(board: Board, name: str) -> Non
 @given(
     steps=st.one_of(st.integers(1, 40), st.integers(1, MAX_SEGMENT_STEPS)),
     first=st.integers(0, 2**31),
-    interval=st.one_of(st.integers(LEAST * ONE - 3, LEAST * ONE + 3), st.integers(0, 2**32 - 1)),
+    interval=st.one_of(st.integers(LEAST * Q8 - 3, LEAST * Q8 + 3), st.integers(0, 2**24), st.integers(0, 2**32 - 1)),
     add=st.one_of(st.integers(-3, 3), st.integers(-(2**31), 2**31 - 1)),
     aim=st.integers(-2, 2),
 )
@@ -115,9 +116,9 @@ def test_verdict_on_any_move(
     # The rules of docs/protocol.md in plain integers; the duration is aimed at the last step's tick.
     move = Move(2 * steps, first) if steps == 1 else Move(2 * steps, first, interval, add)
     n = steps - 1
-    last = first + ((n * interval + n * (n - 1) // 2 * add) >> 16 if n else 0)
+    last = first + ((256 * n * interval + n * (n - 1) // 2 * add) >> 16 if n else 0)
     duration = max(0, min(last + 1 + aim, 2**31 - 1))
-    ends = (interval, interval + (steps - 2) * add)
+    ends = (256 * interval, 256 * interval + (steps - 2) * add)
     good = 1 <= duration <= MAX_SEGMENT_TICKS and 0 <= last < duration
     if n:
         good &= min(ends) >= LEAST * ONE and max(ends) <= MOST * ONE

@@ -272,10 +272,10 @@ def fill(board: Board, message: Segments) -> int:
 def test_segments_are_taken_all_or_none(board: Board) -> None:
     board.get_ready()
     one = Segments(0, 0, 0, (segment_of(20_000, run_of(2)),))
-    two = Segments(0, 0, 0, one.segments * 2)
+    more = Segments(0, 0, 0, one.segments * 3)
     left = fill(board, one)
-    assert encoded_bytes(one) <= left < encoded_bytes(two)
-    status = board.ask(two)
+    assert encoded_bytes(one) <= left < encoded_bytes(more)
+    status = board.ask(more)
     assert (status.free_bytes, status.refusal, status.fault) == (left, Result.OK, Fault.NONE)
     board.seq -= 1  # busy: the same number is expected again
     assert board.replies[-1][0] == board.seq

@@ -58,9 +58,9 @@ def moves(draw: st.DrawFn, rest_ticks: int, was_positive: bool) -> Move:
     first = max(0, least - rest_ticks) + draw(st.one_of(st.just(0), st.integers(0, 3000), st.integers(0, 200_000)))
     if steps == 1:
         return Move(2 + positive, first)
-    limits = (MIN_INTERVAL_TICKS << 16, MAX_INTERVAL_TICKS << 16)
+    limits = (MIN_INTERVAL_TICKS << 8, MAX_INTERVAL_TICKS << 8)
     interval = draw(st.one_of(st.integers(limits[0], limits[0] << 2), st.integers(*limits)))
-    room = (limits[0] - interval, limits[1] - interval) if steps > 2 else (-(2**31), 2**31 - 1)
+    room = (256 * (limits[0] - interval), 256 * (limits[1] - interval)) if steps > 2 else (-(2**31), 2**31 - 1)
     share = max(steps - 2, 1)
     add = draw(st.integers(-(-room[0] // share), room[1] // share))
     return Move(2 * steps + positive, first, interval, max(-(2**31), min(add, 2**31 - 1)))
@@ -140,7 +140,7 @@ def test_every_step_is_on_its_tick(
 def test_ramp_with_fractions(firmware: Firmware, name: str) -> None:
     # A change of an eighth of a tick a step: the fraction must be carried over 1000 steps.
     add = 8192 if name == "up" else -8192
-    interval = (1000 << 16) + 12345 if name == "up" else (1200 << 16) + 12345
+    interval = (1000 << 8) + 48 if name == "up" else (1200 << 8) + 48
     move = Move(2 * 1000 + 1, 77, interval, add)
     motion = [segment_of(step_ticks(move)[-1] + 1, move, run_of(20, interval=50_000), last=True)]
     board = Board(firmware)

@@ -224,7 +224,7 @@ def test_a_silent_host_brings_the_arm_to_rest_on_the_path(firmware: Firmware) ->
     # Nothing more comes: the arm slows down and rests before the road ends; then the host comes back.
     player = Player(firmware, FAST)
     player.start()
-    player.play_until(player.board.now + 25 * SEGMENT_TICKS)
+    player.play_until(player.board.now + 12 * SEGMENT_TICKS)
     sent = len(FAST.segments) - len(player.waiting)
     assert player.waiting
     status = player.play_until(player.board.now + 10**8, State.STARVED, State.FAULT, feed=False)

@@ -63,9 +63,9 @@ def assert_pins_show(line: Transport, segments) -> None:
 def test_hand_made_segments_reach_the_pins_tick_by_tick(line):
     """Every number of the expected ticks is worked out by hand from the fields."""
     segments = (
-        Segment(2 * 16_000, (Move(2 * 4 + 1, 1000, 2000 << 16), Move(0))),
-        Segment(2 * 20_000, (Move(2 * 3, 5000, 4000 << 16, 1000 << 16), Move(2 * 1 + 1, 777))),
-        Segment(2 * 8_000 + 1, (Move(1), Move(2 * 3, 1600, (1000 << 16) + (1 << 15)))),
+        Segment(2 * 16_000, (Move(2 * 4 + 1, 1000, 2000 << 8), Move(0))),
+        Segment(2 * 20_000, (Move(2 * 3, 5000, 4000 << 8, 1000 << 16), Move(2 * 1 + 1, 777))),
+        Segment(2 * 8_000 + 1, (Move(1), Move(2 * 3, 1600, (1000 << 8) + (1 << 7)))),
     )
     result = stream_plan(line, segments)
     joint_1 = [1000, 3000, 5000, 7000, 21_000, 25_000, 30_000]
@@ -167,7 +167,7 @@ def test_a_reset_in_a_motion_stops_the_pins_and_is_told(line):
 def test_a_starved_queue_ends_with_the_exact_position_on_the_path(line):
     """2,000 segments a second of two moves each are more than the line carries; whatever stops it tells the truth."""
     segments = tuple(
-        Segment(2 * 8000 + (index == 999), (Move(2 * 2 + 1, 2000, 4000 << 16), Move(2 * 2, 2000, 4000 << 16)))
+        Segment(2 * 8000 + (index == 999), (Move(2 * 2 + 1, 2000, 4000 << 8), Move(2 * 2, 2000, 4000 << 8)))
         for index in range(1000)
     )
     with pytest.raises(StreamFault, match=r"(queue ran empty|not be placed on its tick).*position exact") as caught:

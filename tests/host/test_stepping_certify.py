@@ -151,7 +151,7 @@ def later_but_longer(segments):
 
 def shorter_intervals(segments):
     k = busy(segments)
-    return with_move(segments, k, 0, interval_q16=segments[k].moves[0].interval_q16 // 2)
+    return with_move(segments, k, 0, interval_q8=segments[k].moves[0].interval_q8 // 2)
 
 
 def bent(segments):

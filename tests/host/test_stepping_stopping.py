@@ -15,7 +15,7 @@ from planarm.stepping.stopping import LARGEST_RATE_PER_S, allowances, least_of_n
 from planarm.stepping.table import table_of
 from planarm.trajectory.timing import time_path
 
-SLICE = 65_536
+SLICE = 62_500
 ONE = joint(speed=2.0, acceleration=10.0)
 SCENE = replace(make_scene(), joints=(ONE, ONE))
 
@@ -75,7 +75,7 @@ def test_a_stop_from_a_constant_speed_takes_half_of_v_over_a():
 
 def test_messages_share_the_least_of_their_segments():
     rates = np.array([5.0, 4.0, 9.0, 9.0, 9.0, 9.0, 1.0, 9.0])
-    assert least_of_neighbours(rates).tolist() == [4.0, 4.0, 4.0, 4.0, 1.0, 1.0, 1.0, 1.0]
+    assert least_of_neighbours(rates).tolist() == [4.0, 4.0, 4.0, 9.0, 9.0, 1.0, 1.0, 1.0]
 
 
 def scheduled(seed, one=ONE):
@@ -91,8 +91,8 @@ def scheduled(seed, one=ONE):
 
 
 def test_a_motion_is_slowed_down_until_every_stop_fits():
-    scene, timed, trajectory, _, plan = scheduled(1, joint(speed=4.0, acceleration=8.0))
-    assert trajectory.duration_s > 1.05 * timed[0].duration_s
+    scene, timed, trajectory, _, plan = scheduled(1, joint(speed=4.0, acceleration=4.0))
+    assert trajectory.duration_s > 1.01 * timed[0].duration_s
     table = table_of(plan)
     assert shortfall_ticks(plan, table).max() <= 0.0
     checks = check_stop(plan, table, Planned.of(trajectory), scene)
@@ -108,9 +108,10 @@ def test_a_motion_whose_stops_fit_is_left_alone():
 
 
 def test_where_no_speed_helps_the_certificate_tells():
-    scene = replace(SCENE, joints=(joint(2.0, 8.5), joint(2.0, 8.5)))  # braking with 8 of 8.5: stops are long
+    scene = replace(SCENE, joints=(joint(4.0, 2.1), joint(4.0, 2.1)))  # braking with 2 of 2.1: stops are long
+    planned = joint(4.0, 2.5)
     path = tip_path(tip_points(np.random.default_rng(1), 5))
-    trajectory, _, plan = schedule(scene, lambda _limit: time_path(path, SCENE.joints))
+    trajectory, _, plan = schedule(scene, lambda _limit: time_path(path, (planned, planned)))
     checks = check_stop(plan, table_of(plan), Planned.of(trajectory), scene)
     road = next(check for check in checks if check.name == "road left after a stop")
     assert road.value < 0.0

@@ -11,7 +11,7 @@ from planarm_wire.codec import decode, encode
 from planarm_wire.framing import Frame, FrameDecoder, encode_frame
 
 IMAGE = Path(__file__).resolve().parents[2] / "firmware/release/uno.hex"
-MOVES_OF_BOTH_JOINTS = (wire.Move(2 * 40 + 1, 1000, 2000 << 16, 0), wire.Move(2 * 40, 1000, 2000 << 16, 0))
+MOVES_OF_BOTH_JOINTS = (wire.Move(2 * 40 + 1, 1000, 2000 << 8, 0), wire.Move(2 * 40, 1000, 2000 << 8, 0))
 MOTION = wire.Segments(0, 0, 0, (wire.Segment(2 * 100_000 + 1, MOVES_OF_BOTH_JOINTS),))
 BYTES_A_ROUND = 6000
 

@@ -109,8 +109,8 @@ def test_known_bytes() -> None:
 
 
 def test_numpys_integers_are_whole_numbers() -> None:
-    move = m.Move(np.int64(5), np.uint32(10), np.int64(900 << 16), np.int64(-4))
-    plain = m.Move(5, 10, 900 << 16, -4)
+    move = m.Move(np.int64(5), np.uint32(10), np.int64(900 << 8), np.int64(-4))
+    plain = m.Move(5, 10, 900 << 8, -4)
     assert encode(m.Segments(0, 0, 0, (m.Segment(20, (move, move)),))) == encode(
         m.Segments(0, 0, 0, (m.Segment(20, (plain, plain)),))
     )
@@ -137,7 +137,7 @@ REFUSED: dict[str, tuple[Any, str]] = {
     ),
     "absent field is not 0": (
         m.Segments(0, 0, 0, (m.Segment(2, (m.Move(2, 0, 1), REST)),)),
-        "segments.segments[0].moves[0].interval_q16: is 1, but must be 0 while steps_dir >= 4 does not hold",
+        "segments.segments[0].moves[0].interval_q8: is 1, but must be 0 while steps_dir >= 4 does not hold",
     ),
     "unknown code": (
         m.Status(99, m.Fault.NONE, 0, m.Result.OK, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, LEDGER),

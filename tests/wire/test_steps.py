@@ -21,7 +21,7 @@ MOVES = st.builds(
 @given(MOVES)
 @settings(deadline=None)
 def test_closed_form_equals_the_sum_of_the_intervals(move: Move) -> None:
-    moment, interval = Fraction(0), Fraction(move.interval_q16, 2**16)
+    moment, interval = Fraction(0), Fraction(move.interval_q8, 2**8)
     expected = []
     for _ in range(steps.step_count(move)):
         expected.append(move.first_ticks + floor(moment))
@@ -32,7 +32,7 @@ def test_closed_form_equals_the_sum_of_the_intervals(move: Move) -> None:
 
 def test_known_steps() -> None:
     # Intervals of 2000, 1900, 1800 ticks after the first step at 100; the other joint turns back once, at 7.
-    segment = Segment(2 * 16_000 + 1, (Move(2 * 4 + 1, 100, 2000 << 16, -(100 << 16)), Move(2, 7)))
+    segment = Segment(2 * 16_000 + 1, (Move(2 * 4 + 1, 100, 2000 << 8, -(100 << 16)), Move(2, 7)))
     assert steps.expand_moves(segment) == ((100, 2100, 4000, 5800), (7,))
     assert [steps.signed_steps(move) for move in segment.moves] == [4, -1]
     assert steps.duration_ticks(segment) == 16_000

@@ -19,8 +19,8 @@ namespace hal {
 // Holds interrupts off while it lives.
 class InterruptLock {
   public:
-    InterruptLock() : saved_(SREG) { cli(); }
-    ~InterruptLock() {
+    HAL_INLINE InterruptLock() : saved_(SREG) { cli(); }
+    HAL_INLINE ~InterruptLock() {
         compiler_fence();
         SREG = saved_;
     }

@@ -8,11 +8,10 @@ from collections.abc import Sequence
 from planarm.link.session import Session
 from planarm_wire.codec import encoded_bytes
 from planarm_wire.messages import HOST_WINDOW_BYTES, MAX_PAYLOAD_BYTES, Segment, Segments
-from planarm_wire.rates import NO_ALLOWANCE, Allowance, head_of
+from planarm_wire.rates import MESSAGE_SEGMENTS, NO_ALLOWANCE, Allowance, head_of
 
 FRAME_BYTES = HOST_WINDOW_BYTES // 2
 HEAD_BYTES = 3  # slow, fast and need of a SEGMENTS message
-LEAST_SEGMENT_BYTES = 3
 
 
 class Packer:
@@ -55,9 +54,8 @@ class Packer:
         self._message = None
 
     def _pack(self) -> Segments:
-        most = MAX_PAYLOAD_BYTES // LEAST_SEGMENT_BYTES
         count, room_bytes = 0, MAX_PAYLOAD_BYTES - HEAD_BYTES
-        for segment in self._segments[self.sent : self.sent + most]:
+        for segment in self._segments[self.sent : self.sent + MESSAGE_SEGMENTS]:
             room_bytes -= encoded_bytes(segment)
             if room_bytes < 0:
                 break

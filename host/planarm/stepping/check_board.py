@@ -12,7 +12,9 @@ from planarm_wire.messages import (
     CRC_BYTES,
     HEADER_BYTES,
     HOST_WINDOW_BYTES,
+    MAX_PAYLOAD_BYTES,
     QUEUE_BYTES,
+    SLICE_TICKS,
     TICKS_HZ,
 )
 
@@ -22,13 +24,14 @@ BITS_PER_BYTE = 10
 STEP_INTERRUPT_TICKS = 79
 LINE_LOAD = 0.1
 READ_TICKS = 15_000
+SLICE_WORK_TICKS = 8_000
 LATEST_READ_TICKS = 20_000
 LEAST_SHARE = 0.05
-QUEUED_HEAD_BYTES = 2.0
+QUEUED_HEAD_BYTES = 4.0
 """What the board takes, measured on the emulator (firmware/README.md, budgets): a step's interrupt; the share of the
-line's interrupts; the main program's work on a segment, from the rates at which it just keeps up (12,000 to 15,000);
-and how long before its start a segment must be there. LEAST_SHARE keeps an overloaded board's time finite; the last is
-a segment's share of its frame's head in the queue, two segments a frame as a rule."""
+line's interrupts; the main program's work on a segment, from the rates at which it just keeps up (12,000 to 15,000),
+and on each further slice of it; how long before its start a segment must be there. LEAST_SHARE keeps an overloaded
+board's time finite; the last is a frame's head in the queue."""
 
 LOAD_WINDOW_TICKS = 80_000
 MOST_LOAD = 0.75
@@ -42,6 +45,7 @@ AMBER_LINE_SHARE = 0.4
 FLUSH_S = 0.0041
 """The Uno's USB bridge (ATmega16U2) keeps a reply for up to 4.1 ms."""
 REPLY_BYTES = 40
+SEGMENTS_HEAD_BYTES = 3
 
 
 def check_board(table: SegmentTable, made: StepTrain, link: LinkSpec) -> list[Check]:
@@ -62,9 +66,15 @@ def _check_load(made: StepTrain) -> Check:
     return at_most("interrupt load in any 5 ms", load, MOST_LOAD, "", where, setting, amber=AMBER_LOAD)
 
 
+def _share_of_frame(table: SegmentTable) -> Floats:
+    """Return each segment's share of its frame: half where the frame is sure to hold two of its size."""
+    return np.where(2 * segment_bytes(table) + QUEUED_HEAD_BYTES <= MAX_PAYLOAD_BYTES, 0.5, 1.0)
+
+
 def _frame_bytes(table: SegmentTable) -> Floats:
-    """Return each segment's bytes on the line, with its share of a frame: two segments a frame, as a rule."""
-    return np.asarray(segment_bytes(table), np.float64) + 0.5 * (HEADER_BYTES + 2 * CRC_BYTES + 1)
+    """Return each segment's bytes on the line, with its share of a frame: header, head, checks and delimiter."""
+    frame = HEADER_BYTES + SEGMENTS_HEAD_BYTES + 2 * CRC_BYTES + 1
+    return np.asarray(segment_bytes(table), np.float64) + _share_of_frame(table) * frame
 
 
 def _check_peak(table: SegmentTable, link: LinkSpec) -> Check:
@@ -96,6 +106,7 @@ def _check_supply(table: SegmentTable, link: LinkSpec) -> list[Check]:
     starts: list[int] = table.starts.tolist()
     line_ticks = (_frame_bytes(table) * BITS_PER_BYTE * TICKS_HZ / link.baud).tolist()
     loads: list[float] = _interrupt_loads(table).tolist()
+    work = (READ_TICKS + SLICE_WORK_TICKS * ((table.durations - 1) // SLICE_TICKS)).tolist()
     line_tick = board_tick = 0.0
     line, board = [(float(starts[-1]), 0)], [(float(starts[-1]), 0)]
     before: list[int] = _begun_before(table).tolist()
@@ -105,7 +116,7 @@ def _check_supply(table: SegmentTable, link: LinkSpec) -> list[Check]:
         line_tick = max(line_tick, float(starts[begun])) + line_ticks[k]
         board_tick = max(board_tick, line_tick)
         running = min(k, bisect_right(starts, board_tick) - 1)
-        board_tick += READ_TICKS / max(1.0 - loads[running], LEAST_SHARE)
+        board_tick += work[k] / max(1.0 - loads[running], LEAST_SHARE)
         line.append((starts[k] - line_tick, k))
         board.append((starts[k] - board_tick - LATEST_READ_TICKS, k))
     checks = []
@@ -121,7 +132,8 @@ def _check_supply(table: SegmentTable, link: LinkSpec) -> list[Check]:
 
 def _begun_before(table: SegmentTable) -> Ticks:
     """Return for each segment the last of those that must have begun before the queue has room for it; -1: none."""
-    total = np.concatenate([[0.0], np.cumsum(np.asarray(segment_bytes(table), np.float64) + QUEUED_HEAD_BYTES)])
+    heads = QUEUED_HEAD_BYTES * _share_of_frame(table)
+    total = np.concatenate([[0.0], np.cumsum(np.asarray(segment_bytes(table), np.float64) + heads)])
     begun: Ticks = np.searchsorted(total, total[1:] - QUEUE_BYTES, side="left") - 1
     return begun
 

@@ -1,9 +1,11 @@
 """Certificate: the arm can come to rest on the path from anywhere, within the segments that the device holds.
 
 The allowances that travel with the plan are held against slowings found from the planned angles alone, by differences,
-and against stops integrated in continuous time; the device, which changes the clock from segment to segment, takes
-longer.
+and against stops integrated in continuous time; the device, which changes the clock from slice to slice, takes longer.
 """
+
+from itertools import pairwise
+from math import ceil
 
 import numpy as np
 
@@ -16,7 +18,7 @@ from planarm.stepping.slowing import LINK_MARGIN_TICKS
 from planarm.stepping.table import SegmentTable, segment_bytes
 from planarm.stepping.train import Floats, Ticks
 from planarm_wire.kernel_cache import kernel
-from planarm_wire.messages import QUEUE_BYTES, TICKS_HZ
+from planarm_wire.messages import MAX_PAYLOAD_BYTES, QUEUE_BYTES, QUEUE_FRAME_BYTES, SLICE_TICKS, TICKS_HZ
 
 ROUNDING = 0.02
 """Differences see accelerations a tenth of a millisecond wide, and the planner's at a point."""
@@ -41,13 +43,12 @@ def check_stop(plan: SegmentPlan, table: SegmentTable, planned: Planned, scene: 
         told_of = f"allowed {name} of the path, share of what the joints can"
         checks.append(at_most(told_of, beyond[k], 1.0 + ROUNDING, "", where, setting))
     needs_s = told[:, 2] / TICKS_HZ
-    shortest = np.array(_stops_s(planned, scene, starts[:-1] / TICKS_HZ))
-    longest_s = float(table.durations.max()) / TICKS_HZ
-    k = int(np.argmax(shortest - needs_s))
-    where = f"segment {k}, {_time(starts[k])}"
-    checks.append(
-        at_most("path time to rest beyond what is told", shortest[k] - needs_s[k], longest_s, "s", where, setting)
-    )
+    at, owner = _slices(table)
+    beyond_s = _stops_s(planned, scene, at / TICKS_HZ) - needs_s[owner]
+    k = int(np.argmax(beyond_s))
+    where = f"segment {owner[k]}, {_time(int(at[k]))}"
+    slice_s = SLICE_TICKS / TICKS_HZ
+    checks.append(at_most("path time to rest beyond what is told", beyond_s[k], slice_s, "s", where, setting))
     checks.append(_check_fit(table, needs_s))
     return checks
 
@@ -59,11 +60,13 @@ def _check_fit(table: SegmentTable, needs_s: Floats) -> Check:
     path, but later than planned.
     """
     starts, last = table.starts, len(table.durations)
+    at, owner = _slices(table)
     name, setting = "road left after a stop", "joints.max_speed_deg_s or joints.max_acceleration_deg_s2"
     spare = [(float("inf"), 0)]
-    for k, end in enumerate(_queue_ends(table)):
-        if end < last:
-            spare.append((int(starts[end] - starts[k] - LINK_MARGIN_TICKS) / TICKS_HZ - float(needs_s[k]), k))
+    ends = _queue_ends(table)
+    for tick, k in zip(at.tolist(), owner.tolist(), strict=True):
+        if ends[k] < last:
+            spare.append((int(starts[ends[k]] - tick - LINK_MARGIN_TICKS) / TICKS_HZ - float(needs_s[k]), k))
     least, k = min(spare)
     if least == float("inf"):
         return at_least(name, float(starts[-1]) / TICKS_HZ, 0.0, "s", "the queue holds the whole rest of the motion")
@@ -71,20 +74,30 @@ def _check_fit(table: SegmentTable, needs_s: Floats) -> Check:
     return Check(name, least, 0.0, "s", verdict, f"segment {k}, {_time(starts[k])}", setting)
 
 
-HEAD_BYTES = 2
-"""What the queue keeps of a frame besides its segments, 4 bytes, shared by two."""
+def _slices(table: SegmentTable) -> tuple[Ticks, Ticks]:
+    """Return where the device may begin to slow down, slice by slice, and in which segment that is."""
+    starts: list[int] = table.starts.tolist()
+    counts = [max(1, ceil((end - begin) / SLICE_TICKS)) for begin, end in pairwise(starts)]
+    borders = zip(pairwise(starts), counts, strict=True)
+    at = [np.arange(begin, end, max(1, ceil((end - begin) / count))) for (begin, end), count in borders]
+    return np.concatenate(at), np.repeat(np.arange(len(at)), [len(one) for one in at])
 
 
 def _queue_ends(table: SegmentTable) -> list[int]:
-    """Return for each segment the first one that a full queue does not hold when it starts."""
-    sizes = [int(size) + HEAD_BYTES for size in segment_bytes(table)]
-    ends, end, held = [], 0, 0
+    """Return for each segment the first one that the queue does not hold while it runs.
+
+    What runs has left the queue; less than the next message may be empty of it. A frame's head and length take four
+    bytes, shared by two segments where their frame is sure to hold both.
+    """
+    room = QUEUE_BYTES - MAX_PAYLOAD_BYTES - QUEUE_FRAME_BYTES
+    sizes = [int(size) + (2 if 2 * size + 4 <= MAX_PAYLOAD_BYTES else 4) for size in segment_bytes(table)]
+    ends, end, held = [], 0, sizes[0]
     for size in sizes:
-        while end < len(sizes) and held + sizes[end] <= QUEUE_BYTES:
-            held += sizes[end]
-            end += 1
-        ends.append(end)
         held -= size
+        while end + 1 < len(sizes) and held + sizes[end + 1] <= room:
+            end += 1
+            held += sizes[end]
+        ends.append(end + 1)
     return ends
 
 

@@ -19,7 +19,7 @@ def expand(plan: SegmentPlan) -> StepTrain:
     steps = []
     for j in range(len(plan.start_usteps)):
         moves = [segment.moves[j] for segment in plan.segments]
-        table = np.array([(m.steps_dir, m.first_ticks, m.interval_q16, m.add_q16) for m in moves], np.int64)
+        table = np.array([(m.steps_dir, m.first_ticks, m.interval_q8 << 8, m.add_q16) for m in moves], np.int64)
         steps_dir, first, interval, add = table.reshape(-1, 4).T
         counts = steps_dir >> 1
         run = np.repeat(np.arange(len(counts)), counts)

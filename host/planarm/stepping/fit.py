@@ -1,10 +1,10 @@
-"""Fit one run of steps by the wire's closed form: T_n = first + floor((n I + n (n - 1) / 2 A) / 2^16).
+"""Fit one run of steps by the wire's closed form: T_n = first + floor((256 n I + n (n - 1) / 2 A) / 2^16).
 
 Each step has a window of allowed ticks. In real numbers T is a quadratic in n; `best_polynomial` finds the one
-whose largest error, in window widths, is least. Its I and A are rounded to integers, and only the exact expansion of
-these decides: it leaves a range for `first`, or none. Where the quadratic is inside all windows but an interval is too
-short or too long, as where a joint comes to or goes on at its top speed, that interval is held at its limit and the
-rest fitted.
+whose largest error, in window widths, is least. Its I is rounded to 2^-8 ticks, A to 2^-16, and only the exact
+expansion of these decides: it leaves a range for `first`, or none. Where the quadratic is inside all windows but an
+interval is too short or too long, as where a joint comes to or goes on at its top speed, that interval is held at its
+limit and the rest fitted.
 """
 
 from math import floor
@@ -19,9 +19,11 @@ from planarm_wire.messages import MAX_INTERVAL_TICKS
 Ticks = NDArray[np.int64]
 Floats = NDArray[np.float64]
 Fit = tuple[bool, int, int, int]
-"""(found, first_ticks, interval_q16, add_q16)"""
+"""(found, first_ticks, interval_q16, add_q16); the interval is a multiple of UNIT_Q16"""
 
 ONE_Q16 = 65536
+UNIT_Q16 = 256
+"""The wire's unit of the first interval."""
 LEAST_ADD = -(1 << 31)
 """The wire's add is a signed number of 32 bits."""
 
@@ -113,7 +115,7 @@ def fitted_line(low: Ticks, high: Ticks, add_q16: int) -> tuple[bool, int]:
         center[n] = 0.5 * (low[n] + high[n] + 1) - 0.5 * n * (n - 1.0) * add_q16 / ONE_Q16
         half[n] = 0.5 * (high[n] + 1 - low[n])
     inside, _, newton = best_polynomial(at, center, half, 1)
-    return inside, floor(newton[1] * ONE_Q16 + 0.5)
+    return inside, UNIT_Q16 * floor(newton[1] * (ONE_Q16 // UNIT_Q16) + 0.5)
 
 
 @kernel
@@ -127,10 +129,10 @@ def fitted(low: Ticks, high: Ticks) -> tuple[bool, int, int]:
     inside, nodes, newton = best_polynomial(at, center, half, 2)
     # c0 + c1 (n - n0) + c2 (n - n0) (n - n1), written with n and n (n - 1) / 2
     interval, add = newton[1] + newton[2] * (1.0 - nodes[0] - nodes[1]), 2.0 * newton[2]
-    add_q16 = floor(add * ONE_Q16 + 0.5)
-    # What rounding A bends is taken back by I, so that both ends of the run stay.
-    bent = add - add_q16 / ONE_Q16
-    return inside, floor((interval + 0.5 * bent * (steps - 2)) * ONE_Q16 + 0.5), add_q16
+    interval_q16 = UNIT_Q16 * floor(interval * (ONE_Q16 // UNIT_Q16) + 0.5)
+    # What rounding I tilts is taken back by A, so that both ends of the run stay.
+    tilted = interval - interval_q16 / ONE_Q16
+    return inside, interval_q16, floor((add + 2.0 * tilted / (steps - 2)) * ONE_Q16 + 0.5)
 
 
 @kernel
@@ -159,5 +161,7 @@ def fitted_held(low: Ticks, high: Ticks, held: int, at_end: bool, sense: int) ->
     inside, _, newton = best_polynomial(at, center, half, 1)
     grows = sense * max(0, sense * floor(newton[1] * ONE_Q16 + 0.5))
     if at_end:
-        return inside, held * ONE_Q16 + (steps - 2) * grows, -grows
+        # Whole units, on the held limit's right side.
+        units = -(-sense * (held * ONE_Q16 + (steps - 2) * grows) // UNIT_Q16)
+        return inside, sense * units * UNIT_Q16, -grows
     return inside, held * ONE_Q16, grows

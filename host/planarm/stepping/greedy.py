@@ -145,7 +145,7 @@ def charge(windows: Windows, following: Ticks, last: Ticks, begin: int, end: int
             shorten(windows, n, last[j], begin, end, runs[j], windows.least_interval[j])
         if count > 1:
             add = runs[j, ADD]
-            total += varuint_bytes(runs[j, INTERVAL]) + varuint_bytes(2 * add if add >= 0 else -2 * add - 1)
+            total += varuint_bytes(runs[j, INTERVAL] >> 8) + varuint_bytes(2 * add if add >= 0 else -2 * add - 1)
         n += count
         if n < windows.first[j + 1]:
             total += varuint_bytes(max(windows.steps[n, SETUP], windows.steps[n, LOW] - end))

@@ -13,9 +13,9 @@ from planarm.stepping.stopping import allowances
 from planarm.stepping.train import StepTrain
 from planarm.trajectory.motion import Trajectory
 
-MOST_ROUNDS = 24
+MOST_ROUNDS = 16
 
-TIGHTER = 0.97
+TIGHTER = 0.9
 """What the device holds is known once the segments are made; if they hold less, a little less is taken for it."""
 
 Timing = Callable[[SpeedLimit | None], Trajectory]

@@ -42,7 +42,7 @@ def _segments(train: StepTrain, ends: Ticks, runs: Ticks) -> tuple[Segment, ...]
         for j, run in enumerate(runs[k].tolist()):
             count = run[COUNT]
             positive = count > 0 and train.steps[j].directions[following[j]] > 0
-            moves.append(Move(2 * count + int(positive), run[FIRST], run[INTERVAL], run[ADD]))
+            moves.append(Move(2 * count + int(positive), run[FIRST], run[INTERVAL] >> 8, run[ADD]))
             following[j] += count
         is_last = k == len(ends) - 1
         segments.append(Segment(2 * (end - begin) + int(is_last), tuple(moves)))

@@ -12,22 +12,19 @@ import numpy as np
 
 from planarm.scene import Scene
 from planarm.stepping.plan import SegmentPlan
-from planarm.stepping.stopping import allowances, held_until
+from planarm.stepping.stopping import allowances, held_until, slice_lengths
 from planarm.stepping.table import SegmentTable, segment_bytes, table_of
-from planarm.stepping.train import Floats
+from planarm.stepping.train import Floats, Ticks
 from planarm.trajectory.motion import Trajectory
-from planarm_wire.messages import TICKS_HZ
+from planarm_wire.messages import SLICE_TICKS, TICKS_HZ
 
 LINK_MARGIN_TICKS = 240_000
-"""15 ms: what may be missing of a full queue, since a reply takes up to 10 ms and a segment on its way 4 ms."""
+"""15 ms: how long what was executed is not yet made good, since a reply takes up to 10 ms and a message 4 ms."""
 
-SLICE_TICKS = 65_536
-
-LEAST_FACTOR = 0.95
-MOST_FACTOR = 0.98
-GENTLE = 0.3
-"""Bounds of one round's change of speed, and the power of what is missing that it takes: many small changes end at a
-faster motion than a few large ones, since a stop's length depends on the motion ahead, too."""
+LEAST_FACTOR = 0.6
+MOST_FACTOR = 0.97
+"""Bounds of one round's change of speed. A stop's path time grows with the speed, so the share of it that there is road
+for is the change; more than one round is needed since it depends on the motion ahead, too."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -59,15 +56,21 @@ class SpeedLimit:
 
 
 def shortfall_ticks(plan: SegmentPlan, table: SegmentTable) -> Floats:
-    """Return how much path time is missing at the start of each segment for a stop from there; negative where none is.
+    """Return how much path time is missing in each segment, at its last slice, for a stop; negative where none is.
 
     Where all of what is left is in the queue nothing is missing: the motion ends at rest.
     """
     starts = table.starts
     held = held_until(starts, segment_bytes(table))
     needs = np.array([allowance.need_ticks for allowance in plan.allowances])
-    spare = held - starts[:-1] - needs - LINK_MARGIN_TICKS
+    spare = held - last_slices(table) - needs - LINK_MARGIN_TICKS
     return np.where(held < starts[-1], -spare, -float(starts[-1]))
+
+
+def last_slices(table: SegmentTable) -> Ticks:
+    """Return the start of each segment's last slice."""
+    lengths = slice_lengths(table.durations)
+    return np.asarray(table.starts[:-1] + (table.durations - 1) // lengths * lengths)
 
 
 def missing_road_ticks(plan: SegmentPlan) -> float | None:
@@ -78,14 +81,13 @@ def missing_road_ticks(plan: SegmentPlan) -> float | None:
     lacking = shortfall_ticks(plan, table) > 0.0
     if not lacking.any():
         return None
-    starts = table.starts
-    return float((held_until(starts, segment_bytes(table)) - starts[:-1])[lacking].mean())
+    return float((held_until(table.starts, segment_bytes(table)) - last_slices(table))[lacking].mean())
 
 
 def slower(trajectory: Trajectory, scene: Scene, road_ticks: float, before: SpeedLimit | None) -> SpeedLimit | None:
     """Return a lower limit of the speed where a stop takes more than a road of this length; None where none does.
 
-    The motion is looked at in slices of the longest segment that a fast motor may have.
+    The motion is looked at in slices as the device cuts them.
     """
     count = -(-int(trajectory.duration_s * TICKS_HZ) // SLICE_TICKS)
     needs = np.array([one.need_ticks for one in allowances(trajectory, scene, [SLICE_TICKS] * count)])
@@ -97,7 +99,7 @@ def slower(trajectory: Trajectory, scene: Scene, road_ticks: float, before: Spee
     factors = np.ones(len(starts))
     for k in lacking.tolist():
         end = int(np.searchsorted(starts, starts[k] + needs[k]))
-        factors[k : end + 1] = np.minimum(factors[k : end + 1], np.clip(fits[k] ** GENTLE, LEAST_FACTOR, MOST_FACTOR))
+        factors[k : end + 1] = np.minimum(factors[k : end + 1], np.clip(fits[k], LEAST_FACTOR, MOST_FACTOR))
     return SpeedLimit.lower(trajectory, starts / TICKS_HZ, factors, before)
 
 

@@ -5,12 +5,13 @@ acceleration q'' u^2 + q' du/dt, with q' and q'' as planned, so it keeps its acc
 
     -du/dt <= slow = min over joints of (a - max(0, -q'' sgn q')) / |q'|,    du/dt <= fast, the same with +q''.
 
-The device changes the clock from segment to segment: with the stretch s = 1 / u, a segment of duration D that starts at
-s0 ends at s1 = s0 + slow D s0^3, at most 2 s0 (docs/protocol.md). Once all motors are below their start-stop speeds it
-stops. `need` follows that rule, segment by segment, so it is what the device takes.
+The device changes the clock from slice to slice of a segment: with the stretch s = 1 / u, a slice of duration D that
+starts at s0 ends at s1 = s0 + slow D s0^3, at most 2 s0 (docs/protocol.md). Once all motors are below their start-stop
+speeds it stops. `need` follows that rule, slice by slice, so it is what the device takes.
 """
 
 from collections.abc import Sequence
+from typing import NamedTuple, Self
 
 import numpy as np
 
@@ -21,7 +22,14 @@ from planarm.stepping.train import Floats, Ticks
 from planarm.stepping.windows import start_stop_ticks
 from planarm.trajectory.motion import Trajectory
 from planarm_wire.kernel_cache import kernel
-from planarm_wire.messages import QUEUE_BYTES, TICKS_HZ
+from planarm_wire.messages import (
+    MAX_PAYLOAD_BYTES,
+    QUEUE_BYTES,
+    QUEUE_FRAME_BYTES,
+    SLICE_TICKS,
+    TICKS_HZ,
+)
+from planarm_wire.rates import MESSAGE_SEGMENTS
 
 JUST_BEFORE_S = 1e-9
 """Accelerations jump at gridpoints; they are looked at on both sides."""
@@ -34,38 +42,63 @@ LARGEST_RATE_PER_S = 1000.0
 ROUNDED_DOWN = 15.0 / 16.0
 """The wire's rates have 16 steps an octave and round down."""
 
-MESSAGE_SEGMENTS = 3
-"""Segments that may share a message, and with it the least of their allowances."""
-
 LARGEST_GROWTH = 2.0
-"""Most by which the device lets the stretch grow in one segment."""
+"""Most by which the device lets the stretch grow in one slice."""
+
+
+class Slices(NamedTuple):
+    """The slices into which the device cuts segments; shape (slices,) each."""
+
+    starts: Ticks
+    durations: Ticks
+    segment: Ticks
+    """Index of the segment."""
+
+    @classmethod
+    def of(cls, durations_ticks: Sequence[int]) -> Self:
+        """Return the slices of segments with these durations, in order."""
+        durations = np.asarray(durations_ticks, np.int64)
+        lengths = slice_lengths(durations)
+        counts = -(-durations // lengths)
+        segment = np.repeat(np.arange(len(durations)), counts)
+        since = (np.arange(len(segment)) - (np.cumsum(counts) - counts)[segment]) * lengths[segment]
+        starts = (np.cumsum(durations) - durations)[segment] + since
+        return cls(starts, np.minimum(lengths[segment], durations[segment] - since), segment)
+
+
+def slice_lengths(durations: Ticks) -> Ticks:
+    """Return the length of each segment's slices but the last."""
+    counts = -(-durations // SLICE_TICKS)
+    return np.asarray(-(-durations // counts))
 
 
 def allowances(trajectory: Trajectory, scene: Scene, durations_ticks: Sequence[int]) -> tuple[Allowance, ...]:
     """Return the allowances of segments with these durations, in order, of one motion."""
     if not durations_ticks:
         return ()
-    starts = np.concatenate([[0], np.cumsum(durations_ticks)]) / TICKS_HZ
-    t_s = _times(trajectory, starts)
+    slices = Slices.of(durations_ticks)
+    starts_s = np.append(slices.starts, slices.starts[-1] + slices.durations[-1]) / TICKS_HZ
+    t_s = _times(trajectory, starts_s)
     _, speeds, accelerations = trajectory.sample(t_s)
     limits = np.array([joint.max_acceleration_rad_s2 for joint in scene.joints])
-    segment = np.searchsorted(starts[1:-1], t_s, side="right")
-    first = np.searchsorted(segment, np.arange(len(durations_ticks)))
+    of_segment = slices.segment[np.searchsorted(starts_s[1:-1], t_s, side="right")]
+    first = np.searchsorted(of_segment, np.arange(len(durations_ticks)))
     slow, fast = (
         np.minimum.reduceat(_largest_change(speeds, sign * accelerations, limits), first) for sign in (1.0, -1.0)
     )
     needs = path_time_to_rest(
-        np.asarray(durations_ticks, np.float64) / TICKS_HZ,
-        ROUNDED_DOWN * least_of_neighbours(slow),
-        _over_start_stop(trajectory, scene, starts[:-1]),
+        slices.durations / TICKS_HZ,
+        ROUNDED_DOWN * least_of_neighbours(slow)[slices.segment],
+        _over_start_stop(trajectory, scene, starts_s[:-1]),
     )
+    most = np.maximum.reduceat(needs, np.searchsorted(slices.segment, np.arange(len(durations_ticks))))
     return tuple(
-        Allowance(float(a), float(b), float(need * TICKS_HZ)) for a, b, need in zip(slow, fast, needs, strict=True)
+        Allowance(float(a), float(b), float(need * TICKS_HZ)) for a, b, need in zip(slow, fast, most, strict=True)
     )
 
 
 def _times(trajectory: Trajectory, starts_s: Floats) -> Floats:
-    """Return times at which to look, sorted: borders and gridpoints from both sides, and INNER in each segment."""
+    """Return times at which to look, sorted: borders and gridpoints from both sides, and INNER in each slice."""
     inner = starts_s[:-1, None] + np.diff(starts_s)[:, None] * (np.arange(1, INNER + 1) / (INNER + 1))
     jumps = np.concatenate([starts_s[:-1], trajectory.t_s[:-1]])
     before = np.concatenate([starts_s[1:], trajectory.t_s[1:]]) - JUST_BEFORE_S
@@ -96,12 +129,12 @@ def least_of_neighbours(rates: Floats) -> Floats:
 
 @kernel
 def path_time_to_rest(durations_s: Floats, slow_per_s: Floats, over_start_stop: Floats) -> Floats:
-    """Return the path time that a stop takes from the start of each segment, by the device's rule.
+    """Return the path time that a stop takes from the start of each slice, by the device's rule.
 
     Args:
-        durations_s: of the segments.
+        durations_s: of the slices.
         slow_per_s: the slowing that the device may use in each.
-        over_start_stop: how many times its start-stop speed a motor has at each segment's start.
+        over_start_stop: how many times its start-stop speed a motor has at each slice's start.
     """
     count = durations_s.shape[0]
     needs = np.zeros(count)
@@ -115,13 +148,25 @@ def path_time_to_rest(durations_s: Floats, slow_per_s: Floats, over_start_stop: 
     return needs
 
 
-QUEUED_HEAD_BYTES = 2
-"""A segment's share of its frame's head in the device's queue, four bytes, two segments a frame as a rule."""
+HEAD_BYTES = 4
+"""What the device's queue keeps of a frame besides its segments: slow, fast, need and a length."""
+
+UNSURE_BYTES = MAX_PAYLOAD_BYTES + QUEUE_FRAME_BYTES
+"""What may be empty of a full queue: less than the next message takes."""
+
+
+def queued_bytes(segment_bytes: Ticks) -> Ticks:
+    """Return the bytes that segments take in the device's queue, with their share of the head of their frame.
+
+    Two share a frame where both are short enough, stuffed bytes included; else each has its own.
+    """
+    alone = MESSAGE_SEGMENTS * segment_bytes + HEAD_BYTES > MAX_PAYLOAD_BYTES
+    return np.asarray(segment_bytes + np.where(alone, HEAD_BYTES, HEAD_BYTES // MESSAGE_SEGMENTS))
 
 
 def held_until(starts: Ticks, segment_bytes: Ticks) -> Ticks:
-    """Return the end of the path that the device holds when each segment starts and its queue is full, in ticks."""
+    """Return the end of the path that the device holds while each segment runs and its queue is full, in ticks."""
     last = len(segment_bytes)
-    total = np.concatenate([[0], np.cumsum(segment_bytes + QUEUED_HEAD_BYTES)])
-    held = np.minimum(np.searchsorted(total, total[:-1] + QUEUE_BYTES, side="right") - 1, last)
-    return np.asarray(starts[held])
+    total = np.concatenate([[0], np.cumsum(queued_bytes(segment_bytes))])
+    until = np.searchsorted(total, total[1:] + QUEUE_BYTES - UNSURE_BYTES, side="right") - 1
+    return np.asarray(starts[np.minimum(until, last)])

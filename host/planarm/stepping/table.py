@@ -42,7 +42,7 @@ def table_of(plan: SegmentPlan) -> SegmentTable:
     joints = len(plan.start_usteps)
     flags = np.array([segment.duration_flags for segment in plan.segments], np.int64)
     rows = [
-        (move.steps_dir, move.first_ticks, move.interval_q16, move.add_q16)
+        (move.steps_dir, move.first_ticks, move.interval_q8 << 8, move.add_q16)
         for segment in plan.segments
         for move in segment.moves[:joints]
     ]
@@ -57,7 +57,7 @@ def segment_bytes(table: SegmentTable) -> Ticks:
     some, several = table.counts > 0, table.counts > 1
     moves = _varuint_bytes(2 * table.counts + table.positive) + some * _varuint_bytes(table.first)
     zigzag = np.where(table.add_q16 >= 0, 2 * table.add_q16, -2 * table.add_q16 - 1)
-    moves = moves + several * (_varuint_bytes(table.interval_q16) + _varuint_bytes(zigzag))
+    moves = moves + several * (_varuint_bytes(table.interval_q16 >> 8) + _varuint_bytes(zigzag))
     total: Ticks = size + moves.sum(axis=1)
     return total
 

@@ -20,6 +20,7 @@ from planarm_wire.messages import (
     MAX_SEGMENT_STEPS,
     MIN_DIR_SETUP_TICKS,
     MIN_INTERVAL_TICKS,
+    SLICE_TICKS,
     TICKS_HZ,
 )
 
@@ -36,14 +37,15 @@ class Coding:
         ticks: 16 are 1 us.
         share: of the shorter interval.
         most_share: of the shorter interval, the most that `ticks` may be.
-        fast_ticks: a segment may be no longer than this where any motor is above its start-stop speed.
+        fast_ticks: a segment may be no longer than this where any motor is above its start-stop speed: its allowances
+            hold for all of it.
         start_stop_ticks: of each motor, the interval at that speed; a motor that is not listed has none, is never fast.
     """
 
     ticks: int = 16
     share: float = 0.02
     most_share: float = 0.04
-    fast_ticks: int = 65_536
+    fast_ticks: int = 4 * SLICE_TICKS
     start_stop_ticks: tuple[int, ...] = ()
 
     @classmethod
@@ -76,8 +78,9 @@ class Windows(NamedTuple):
 
 LOW, HIGH, GAP, SETUP, RUN_END, TICK, FAST = 0, 1, 2, 3, 4, 5, 6
 """Columns of a step: earliest and latest tick; least ticks since the joint's step before; least ticks since the start
-of the step's segment, above 0 where DIR may change; index after the last step that may share a run with this one; the
-exact tick; how many of the joint's intervals up to this step are those of a fast motor."""
+of the step's segment, above 0 for the first step, since DIR may change at START; index after the last step that may
+share a run with this one; the exact tick; how many of the joint's intervals up to this step are those of a fast motor.
+"""
 
 
 def tolerance_ticks(steps: JointSteps, coding: Coding = EXACT_TO_1_US) -> Ticks:
@@ -122,11 +125,12 @@ def _tighten(ticks: Ticks, directions: Directions, least_interval: int, steps: T
     for n in range(count):
         turns = n == 0 or directions[n] != directions[n - 1]
         steps[n, GAP] = MIN_REVERSAL_TICKS if turns else least_interval
-        steps[n, SETUP] = MIN_DIR_SETUP_TICKS if turns else 0
+        steps[n, SETUP] = MIN_DIR_SETUP_TICKS if n == 0 else 0
     for n in range(count - 1, -1, -1):
         if n + 1 < count:
             steps[n, HIGH] = min(steps[n, HIGH], steps[n + 1, HIGH] - steps[n + 1, GAP])
-        ends = n + 1 == count or steps[n + 1, SETUP] > 0 or steps[n + 1, LOW] - steps[n, HIGH] > MAX_INTERVAL_TICKS
+        ends = n + 1 == count or directions[n + 1] != directions[n]
+        ends = ends or steps[n + 1, LOW] - steps[n, HIGH] > MAX_INTERVAL_TICKS
         steps[n, RUN_END] = n + 1 if ends else steps[n + 1, RUN_END]
     for n in range(count):
         steps[n, RUN_END] = min(steps[n, RUN_END], n + MAX_SEGMENT_STEPS)

@@ -20,10 +20,10 @@ from planarm_wire.steps import expand_moves
 
 _STUFFED_U32: Final = 0x7B7C7D7E  # every byte must be escaped
 _REST: Final = m.Move(0)
-_RAMP_UP: Final = m.Move(2 * 5 + 1, 100, 2000 << 16, -(100 << 16))
-_RAMP_DOWN: Final = m.Move(2 * 4, 0, (1000 << 16) + 1, 0x8001)
+_RAMP_UP: Final = m.Move(2 * 5 + 1, 100, 2000 << 8, -(100 << 16))
+_RAMP_DOWN: Final = m.Move(2 * 4, 0, (1000 << 8) + 1, 0x8001)
 _ALL_STUFFED: Final = m.Move(0x7D, 0x7C, 0x7B, 0x3E)  # the last is 0x7C after zigzag
-_EXTREME: Final = m.Move(2 * m.MAX_SEGMENT_STEPS + 1, m.MAX_SEGMENT_TICKS, m.MAX_INTERVAL_TICKS << 16, -(2**31))
+_EXTREME: Final = m.Move(2 * m.MAX_SEGMENT_STEPS + 1, m.MAX_SEGMENT_TICKS, m.MAX_INTERVAL_TICKS << 8, -(2**31))
 
 
 _AT_ZERO: Final = m.Ledger(0, (0, 0))
@@ -37,10 +37,10 @@ _SEGMENTS: Final[tuple[m.Segment, ...]] = (
     m.Segment(2 * 20_000, (_REST, _REST)),
     m.Segment(2 * 20_000 + 1, (m.Move(1), m.Move(3, 19_999))),
     m.Segment(2 * 16_000, (_RAMP_UP, _RAMP_DOWN)),
-    m.Segment(2 * 4_000, (m.Move(2 * 4 + 1, 0, 800 << 16, 0), m.Move(2 * 2, 1, (1294 << 16) + 0xFFFF, 0))),
+    m.Segment(2 * 4_000, (m.Move(2 * 4 + 1, 0, 800 << 8, 0), m.Move(2 * 2, 1, (1294 << 8) + 0xFF, 0))),
     # A fraction of a tick: the floor of a falling sum, and a sum that passes 32 bits.
-    m.Segment(2 * 400_000 + 1, (m.Move(2 * 40, 7, (9_000 << 16) + 5, -13), m.Move(2 * 7 + 1, 3, 59_999 << 16, 1))),
-    m.Segment(2 * 12_000_000, (m.Move(2 * 300 + 1, 799, 39_900 << 16, -0x123456), m.Move(2, 11_999_999))),
+    m.Segment(2 * 400_000 + 1, (m.Move(2 * 40, 7, (9_000 << 8) + 5, -13), m.Move(2 * 7 + 1, 3, 59_999 << 8, 1))),
+    m.Segment(2 * 12_000_000, (m.Move(2 * 300 + 1, 799, 39_900 << 8, -0x123456), m.Move(2, 11_999_999))),
 )
 
 _MESSAGES: Final[tuple[m.Message, ...]] = (
