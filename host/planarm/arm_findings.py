@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -13,7 +13,9 @@ from numpy.typing import NDArray
 from planarm.link.arm_record import ArmRecord, Touch
 from planarm.model.arm import Arm
 from planarm.model.kinematics import forward
+from planarm.model.moving import first_touches, moving_set
 from planarm.plan import Plan
+from planarm.scene import Scene
 from planarm_wire.messages import TICKS_HZ
 
 SETTLE_S = 0.25
@@ -103,6 +105,7 @@ def judge_arm(plan: Plan, record: ArmRecord, start_tick: int) -> ArmFindings:
         during[-1] = True
     t_s, q_rad = t_s[during], record.q_rad[during]
     arm = Arm.from_spec(plan.scene.arm)
+    record = replace(record, touches=(*record.touches, *_moving_touches(plan.scene, t_s, q_rad, start_tick)))
     planned = trajectory.sample(np.clip(t_s, 0.0, trajectory.duration_s))[0]
     errors_cm = forward(arm, q_rad)[:, -1] - forward(arm, planned)[:, -1]
 
@@ -116,6 +119,22 @@ def judge_arm(plan: Plan, record: ArmRecord, start_tick: int) -> ArmFindings:
         places=tuple(place(loss.ticks) for loss in record.lost),
         touches=tuple(_touch_words(touch, place(touch.ticks)) for touch in record.touches),
     )
+
+
+def _moving_touches(scene: Scene, t_s: NDArray[np.float64], q_rad: NDArray[np.float64], start_tick: int) -> list[Touch]:
+    """Return the first touch of each moving obstacle with the arm as it really moved; resting ones touch by themselves.
+
+    The motion's start is the obstacles' time 0.
+    """
+    if scene.moving is None:
+        return []
+    moving = moving_set(scene, float(t_s[-1]))
+    found = first_touches(moving, t_s, forward(Arm.from_spec(scene.arm), q_rad), 0.5 * scene.arm.link_width_cm)
+    return [
+        Touch(start_tick + round(t_s[pose] * TICKS_HZ), int(link) + 1, number)
+        for number, ((pose, link), obstacle) in enumerate(zip(found, scene.obstacles, strict=True), start=1)
+        if pose >= 0 and obstacle.motion is not None
+    ]
 
 
 def start_tick_of(planned: Sequence[NDArray[np.int64]], seen: Sequence[NDArray[np.int64]]) -> int:

@@ -31,6 +31,7 @@ from planarm.link.stream import StreamProgress
 from planarm.link.transport import PinTrace, Transport, open_transport
 from planarm.model.arm import Arm
 from planarm.model.kinematics import forward
+from planarm.moving_route import find_moving_route
 from planarm.plan import Findings, Plan
 from planarm.plan_file import StoredPlan
 from planarm.record.outcome import Outcome, Seen, StreamLog
@@ -40,7 +41,7 @@ from planarm.scene import Scene
 from planarm.search.path import Path as TipPath
 from planarm.stepping.certify import certify
 from planarm.stepping.quantise import quantisation_bound_cm
-from planarm.stepping.schedule import schedule
+from planarm.stepping.schedule import encode, schedule
 from planarm.stepping.segments import SegmentPlan, expand
 from planarm.stepping.slowing import SpeedLimit
 from planarm.streaming import options_for, record, stream
@@ -49,6 +50,7 @@ from planarm.trajectory.binding import report_timing
 from planarm.trajectory.limits import Limits
 from planarm.trajectory.motion import Trajectory
 from planarm.trajectory.timing import fastest_motion
+from planarm.workspace.free_map import build_free_map
 from planarm_wire.messages import DIR_PINS, STEP_PINS
 
 Notice = Callable[[str, float], None]
@@ -75,6 +77,8 @@ def plan_scene(scene: Scene, notice: Notice) -> Plan:
     began_s = time.perf_counter()
     notice("plan", 0.0)
     margin_cm = planning_margin_cm(scene)
+    if scene.moving is not None:
+        return plan_moving(scene, margin_cm, began_s, notice)
     route = find_route(scene, margin_cm)
     notice("plan", 0.4)
     limits = Limits.of(scene)
@@ -102,6 +106,36 @@ def plan_scene(scene: Scene, notice: Notice) -> Plan:
         search_ms=1e3 * route.search_s,
         joint=route.joint,
         bound_cm=bound_cm,
+    )
+
+
+def plan_moving(scene: Scene, margin_cm: float, began_s: float, notice: Notice) -> Plan:
+    """Plan among moving obstacles: the motion's times are its appointments, so nothing times it again.
+
+    Raises:
+        SceneError, NoPathError, TimingError: As `plan_scene`.
+    """
+    route = find_moving_route(scene, margin_cm)
+    notice("plan", 0.6)
+    trajectory = Trajectory.in_own_time(route.spline)
+    train, segments = encode(scene, trajectory)
+    notice("plan", 0.8)
+    certificate = certify(scene, trajectory, train, segments)
+    notice("plan", 1.0)
+    path = TipPath.through(tip_curve_cm(trajectory, Arm.from_spec(scene.arm)), route.path.elbow)
+    return Plan(
+        scene,
+        build_free_map(scene, margin_cm, route.path.elbow),
+        path,
+        trajectory.path,
+        trajectory,
+        train,
+        segments,
+        certificate,
+        plan_ms=1e3 * (time.perf_counter() - began_s),
+        timing=report_timing(trajectory, Limits.of(scene), fixed=True),
+        search_ms=1e3 * route.search_s,
+        moving=route,
     )
 
 

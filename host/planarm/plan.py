@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from planarm.analysis.step_count import MeasuredSteps, StepComparison
+from planarm.moving_route import MovingRoute
 from planarm.scene import Scene
 from planarm.search.joint_space import JointRoute
 from planarm.search.path import Path
@@ -37,6 +38,8 @@ class Plan:
     """Wall time of the grid search alone."""
     joint: JointRoute | None = None
     """The way-points of a route in joint space."""
+    moving: MovingRoute | None = None
+    """How the motion among moving obstacles was found; None where obstacles rest."""
     bound_cm: float | None = None
     """No path of the tip on the map is shorter; None where the path was searched, or optimised, in joint space."""
 

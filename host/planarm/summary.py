@@ -58,6 +58,7 @@ def planned_figures(plan: Plan) -> dict[str, Any]:
         "plan_ms": round(plan.plan_ms, 3),
         "objective": scene.planner.objective,
         **plan.timing.figures(),
+        **_moving_figures(plan),
         "certificate_ok": plan.certificate.ok,
         "segments": len(plan.segments.segments),
         "steps_planned": [len(joint.ticks) for joint in plan.train.steps],
@@ -67,6 +68,22 @@ def planned_figures(plan: Plan) -> dict[str, Any]:
 def seen_figures(findings: Findings | None, arm: ArmFindings | None) -> dict[str, Any]:
     """Return the figures that pins and emulated arm give, whether or not the motion came to its end."""
     return {**_pin_figures(findings), **(arm.figures() if arm else {})}
+
+
+def _moving_figures(plan: Plan) -> dict[str, Any]:
+    """Return the figures of a plan among moving obstacles; none where obstacles rest."""
+    route = plan.moving
+    if route is None:
+        return {}
+    return {
+        "sample_s": route.moving_map.clock.sample_s,
+        "arrival_sample": route.path.arrival,
+        "waits": len(route.path.waits),
+        "delay_margin_s": round(route.delay_margin_s, 6),
+        "node_path_length_cm": round(route.path.length_cm, 6),
+        "moves_proved_one_by_one": route.proofs,
+        "map_ms": round(1e3 * route.map_s, 3),
+    }
 
 
 def tip_figures(plan: Plan, net_usteps: tuple[int, ...]) -> dict[str, float]:

@@ -75,7 +75,7 @@ ALLOWED: dict[str, set[str]] = {
     },
     # docs/decisions/0020: the emulated arm is built from the scene's shapes and transmission
     "planarm.link": {"planarm.errors", "planarm.scene", "planarm.model", "planarm_wire", "planarm_sim"},
-    "planarm.arm_findings": {"planarm.link", "planarm.model", "planarm.plan", "planarm_wire"},
+    "planarm.arm_findings": {"planarm.link", "planarm.model", "planarm.plan", "planarm.scene", "planarm_wire"},
     "planarm.analysis": {"planarm.errors", *WIRE},
     "planarm.report": {
         "planarm",
@@ -83,7 +83,17 @@ ALLOWED: dict[str, set[str]] = {
         "planarm.analysis",
         "planarm_wire",
     },  # analysis: the types of what it prints
+    # docs/decisions/0071: a motion among moving obstacles has its times from the search
+    "planarm.moving_route": {
+        "planarm.errors",
+        "planarm.scene",
+        "planarm.model",
+        "planarm.workspace",
+        "planarm.search",
+        "planarm.smoothing",
+    },
     "planarm.plan": {
+        "planarm.moving_route",
         "planarm.scene",
         "planarm.workspace",
         "planarm.search",
@@ -124,6 +134,7 @@ ALLOWED: dict[str, set[str]] = {
         "planarm.stepping",
         "planarm.link",
         "planarm.analysis",
+        "planarm.moving_route",
         "planarm.plan",
         "planarm.plan_file",
         "planarm.record",

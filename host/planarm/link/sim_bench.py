@@ -151,7 +151,7 @@ def rig_of(scene: Scene, start_usteps: tuple[int, ...]) -> Rig:
         coupling=scene.coupling,
         gravity_m_s2=GRAVITY_M_S2 if mechanics.gravity else 0.0,
         base_m=(CM * scene.arm.base_cm[0], CM * scene.arm.base_cm[1]),
-        obstacles=tuple(_obstacle(obstacle) for obstacle in scene.obstacles),
+        obstacles=tuple(_obstacle(obstacle) for obstacle in scene.obstacles if obstacle.motion is None),
         switches=tuple(LimitSwitch(s.joint - 1, s.pin, s.at_rad, s.above, s.bounce_s) for s in scene.limit_switches),
     )
 

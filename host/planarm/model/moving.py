@@ -203,3 +203,30 @@ def _in_parallelogram(point: Floats, ox: float, oy: float, ux: float, uy: float,
     px, py = point[0] - ox, point[1] - oy
     along_u, along_v = (px * vy - py * vx) / area, (ux * py - uy * px) / area
     return bool(0.0 <= along_u <= 1.0 and 0.0 <= along_v <= 1.0)
+
+
+@kernel
+def first_touches(moving: MovingSet, times_s: Floats, joints_cm: Floats, within_cm: float) -> NDArray[np.int64]:
+    """Return for each obstacle the first pose that comes within a distance of it, and its link: (-1, -1) for none.
+
+    Each pose is taken to last until the next pose's time; obstacles move meanwhile.
+
+    Args:
+        moving: the obstacles.
+        times_s: when each pose begins, ascending, shape (n,).
+        joints_cm: base, elbow and tip of each, shape (n, 3, 2).
+        within_cm: from a link's centre line.
+    """
+    found = np.full((moving.speeds_cm_s.shape[0], 2), -1, np.int64)
+    for i in range(found.shape[0]):
+        for n in range(times_s.shape[0]):
+            until = times_s[min(n + 1, times_s.shape[0] - 1)]
+            for link in range(2):
+                ax, ay = joints_cm[n, link, 0], joints_cm[n, link, 1]
+                bx, by = joints_cm[n, link + 1, 0], joints_cm[n, link + 1, 1]
+                gap = gap_in_span(moving, i, times_s[n], until, ax, ay, bx, by, bx, by, within_cm)
+                if gap <= within_cm and found[i, 0] < 0:
+                    found[i, 0], found[i, 1] = n, link
+            if found[i, 0] >= 0:
+                break
+    return found

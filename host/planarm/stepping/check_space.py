@@ -6,6 +6,7 @@ from planarm.model.shapes import obstacle_set, shape_of
 from planarm.model.transmission import Transmission
 from planarm.scene import Scene
 from planarm.stepping.certificate import Check, Verdict, at_least, at_most
+from planarm.stepping.check_moving import check_moving
 from planarm.stepping.clearance import clearances_cm
 from planarm.stepping.poses import MotorPositions, Poses, poses_of
 from planarm.stepping.train import Floats, StepTrain
@@ -29,7 +30,8 @@ def check_space(scene: Scene, made: StepTrain, at: MotorPositions) -> list[Check
     poses = poses_of(scene.arm, transmission, made, at)
     checks = []
     if scene.obstacles:
-        checks.append(_check_clearance(scene, poses))
+        moving = scene.moving
+        checks.append(_check_clearance(scene, poses) if moving is None else check_moving(scene, moving, poses))
     if scene.arm.floor:
         height: Floats = poses.positions_cm[:, 1:, 1].min(axis=1) - poses.reach_cm
         worst = int(np.argmin(height))

@@ -21,6 +21,18 @@ TIGHTER = 0.9
 Timing = Callable[[SpeedLimit | None], Trajectory]
 
 
+def encode(scene: Scene, trajectory: Trajectory, coding: Coding | None = None) -> tuple[StepTrain, SegmentPlan]:
+    """Return a motion's steps and segments with their allowances, its times as they are.
+
+    Raises:
+        TimingError: a joint would have to step faster than the firmware can.
+    """
+    train = quantise(trajectory, scene.joints, scene.coupling)
+    plan = compress(train, coding or Coding.of(motor_axes(scene.joints, scene.coupling)))
+    durations = [segment.duration_flags >> 1 for segment in plan.segments]
+    return train, replace(plan, allowances=allowances(trajectory, scene, durations))
+
+
 def schedule(scene: Scene, timing: Timing) -> tuple[Trajectory, StepTrain, SegmentPlan]:
     """Return a motion from which the device can come to rest on the path at any moment, its steps and its segments.
 
@@ -43,10 +55,7 @@ def schedule(scene: Scene, timing: Timing) -> tuple[Trajectory, StepTrain, Segme
         if lower is not None:
             limit = lower
             continue
-        train = quantise(trajectory, scene.joints, scene.coupling)
-        plan = compress(train, coding)
-        durations = [segment.duration_flags >> 1 for segment in plan.segments]
-        plan = replace(plan, allowances=allowances(trajectory, scene, durations))
+        train, plan = encode(scene, trajectory, coding)
         missing = missing_road_ticks(plan)
         if missing is None:
             return trajectory, train, plan

@@ -63,12 +63,13 @@ class TimingReport:
         return f"held back by {held} of the time; keeping a stop possible costs {100.0 * self.braking_cost:.1f} %"
 
 
-def report_timing(trajectory: Trajectory, limits: Limits) -> TimingReport:
+def report_timing(trajectory: Trajectory, limits: Limits, *, fixed: bool = False) -> TimingReport:
     """Return what holds a timed motion back.
 
     Args:
         trajectory: the motion.
         limits: the limits it was timed under.
+        fixed: its times are those of appointments, which more acceleration does not change.
     """
     if len(trajectory.t_s) == 1:
         return TimingReport((), 0.0, limits.acceleration_share, 0.0)
@@ -82,7 +83,7 @@ def report_timing(trajectory: Trajectory, limits: Limits) -> TimingReport:
         for k in np.argsort(-shares, kind="stable")
         if shares[k] > 0.0
     ]
-    full_s = _full_acceleration_s(trajectory, grid, limits)
+    full_s = trajectory.duration_s if fixed else _full_acceleration_s(trajectory, grid, limits)
     return TimingReport(tuple(binding), trajectory.duration_s, limits.acceleration_share, full_s)
 
 

@@ -1,6 +1,7 @@
 """A timed motion: the path parameter as a piecewise quadratic function of time."""
 
 from dataclasses import dataclass
+from typing import Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -27,6 +28,12 @@ class Trajectory:
     s: Floats
     s_dot: Floats
     q_rad: Floats
+
+    @classmethod
+    def in_own_time(cls, path: SmoothPath) -> Self:
+        """Return the motion along a path whose parameter is time in seconds, from 0, as it is."""
+        t_s = np.asarray(path.borders_s, np.float64)
+        return cls(path, t_s, t_s, np.ones(len(t_s)), path.evaluate(t_s, "left").q_rad)
 
     @property
     def duration_s(self) -> float:
