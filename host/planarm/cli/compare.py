@@ -1,4 +1,4 @@
-"""`planarm compare table2|mpdstar`: a paper's tables, computed anew; `--external CMD`: a planner on the benchmark."""
+"""`planarm compare`: a paper's table (table2, mpdstar, moving) computed anew; `--external CMD`: the benchmark."""
 
 from __future__ import annotations
 
@@ -28,12 +28,14 @@ SAVING_SCENES = 60
 def execute(options: argparse.Namespace) -> int:
     """Compute the comparison, print it, and write it down where --out says."""
     if (options.table is None) == (options.external is None):
-        raise UsageError("give table2 or mpdstar, or --external CMD")
+        raise UsageError("give table2, mpdstar or moving, or --external CMD")
     compile_first("planarm")
     if options.external is not None:
         return _external(options)
     if options.table == "mpdstar":
         return _mpdstar(options)
+    if options.table == "moving":
+        return _moving(options) if options.random is None else _random(options)
     return _as_printed(options) if options.as_printed else _table2(options)
 
 
@@ -108,6 +110,51 @@ def _table2(options: argparse.Namespace) -> int:
         print(json.dumps(as_json(result)))
     else:
         _print(result, out)
+    return 0
+
+
+def _random(options: argparse.Namespace) -> int:
+    """Plan random scenes among moving obstacles in three ways."""
+    from dataclasses import asdict
+
+    from planarm.experiments.moving_random import compare_random, findings, tables
+
+    with progress(options.json) as notice:
+        result = compare_random(options.random, notice=notice)
+    if options.json:
+        print(json.dumps(asdict(result)))
+        return 0
+    for one in tables(result):
+        terminal().print(_shown(one))
+    _print_sentences(terminal(), "What that means", findings(result))
+    return 0
+
+
+def _moving(options: argparse.Namespace) -> int:
+    """Compute paper B's two environments anew."""
+    from planarm.experiments.moving import compare_moving
+    from planarm.experiments.moving_folder import write_moving
+    from planarm.experiments.moving_tables import as_json, assumptions, findings, tables
+
+    out = Path(options.out) if options.out else None
+    if out:
+        with writing(out):  # before the work is done
+            out.mkdir(parents=True, exist_ok=True)
+    with progress(options.json) as notice:
+        result = compare_moving(notice=notice)
+        if out:
+            with writing(out):
+                write_moving(result, out, notice)
+    if options.json:
+        print(json.dumps(as_json(result)))
+        return 0
+    console = terminal()
+    _print_sentences(console, "What is assumed", assumptions(result))
+    for one in tables(result):
+        console.print(_shown(one))
+    _print_sentences(console, "What is reproduced, and what is not", findings(result))
+    if out:
+        console.print(f"moving.json, moving.md, pictures and animations: {out}", markup=False)
     return 0
 
 

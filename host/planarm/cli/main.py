@@ -200,7 +200,10 @@ def _add_emulate(commands: Commands) -> None:
 def _add_compare(commands: Commands) -> None:
     command = commands.add_parser("compare", help="compute a paper's table anew beside the published one")
     command.add_argument(
-        "table", nargs="?", choices=("table2", "mpdstar"), help="table2: paper C's planners; mpdstar: paper A's"
+        "table",
+        nargs="?",
+        choices=("table2", "mpdstar", "moving"),
+        help="table2: paper C's planners; mpdstar: paper A's; moving: paper B's obstacles that move",
     )
     command.add_argument("--external", metavar="CMD", help="score a planner of yours on the open benchmark instead")
     command.add_argument(
@@ -208,9 +211,12 @@ def _add_compare(commands: Commands) -> None:
     )
     command.add_argument("--nodes", type=_count, default=100_000, metavar="N", help="largest graph of mpdstar (100000)")
     command.add_argument("--timeout-s", type=float, default=60.0, metavar="S", help="longest wait for an answer")
-    command.add_argument("--out", metavar="DIR", help="folder for table2.json, table2.md and pictures")
+    command.add_argument("--out", metavar="DIR", help="folder for TABLE.json, TABLE.md and pictures")
     command.add_argument(
         "--as-printed", action="store_true", help="run the printed equations and pseudo-code, errors included, instead"
+    )
+    command.add_argument(
+        "--random", type=_count, metavar="N", help="with moving: N random scenes among moving obstacles instead"
     )
     command.add_argument("--seeds", type=_count, default=200, metavar="N", help="draws of Chaos A* (default: 200)")
     _add_json(command)

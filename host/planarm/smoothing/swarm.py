@@ -74,6 +74,7 @@ def fly(
     settings: SwarmSettings | None = None,
     *,
     limited: bool = True,
+    bar_cm: float | None = None,
 ) -> SwarmResult:
     """Return the shortest motion that a swarm finds around a path.
 
@@ -84,17 +85,19 @@ def fly(
         rng: where all chance comes from.
         settings: how the swarm flies.
         limited: keep the joints' speeds and accelerations.
+        bar_cm: what a curve must be shorter than; None takes the path's length.
     """
     settings = settings or SwarmSettings()
+    bar_cm = path.length_cm if bar_cm is None else bar_cm
     vias = _vias(path, settings, rng)
     if not len(vias):
-        return SwarmResult(None, path.length_cm, (path.length_cm,) * (settings.iterations + 1), 0)
+        return SwarmResult(None, bar_cm, (bar_cm,) * (settings.iterations + 1), 0)
     flight = _Flight(scene, moving_map, path, vias, settings, limited)
     largest = settings.largest_shift_cm
     shifts = np.clip(_first_shifts(path, vias, flight.straight, settings, rng), -largest, largest)
     speeds = rng.uniform(-1.0, 1.0, shifts.shape) * settings.speed_share * largest
-    best, bars = shifts.copy(), np.full(settings.particles, path.length_cm)
-    leader, length_cm, spline, feasible = np.zeros_like(shifts[0]), path.length_cm, None, 0
+    best, bars = shifts.copy(), np.full(settings.particles, bar_cm)
+    leader, length_cm, spline, feasible = np.zeros_like(shifts[0]), bar_cm, None, 0
     curve = [length_cm]
     for _ in range(settings.iterations):
         costs, tips = flight.costs(shifts, bars)
