@@ -14,9 +14,10 @@ from planarm.link.arm_record import ArmSetup
 from planarm.link.transport import open_transport
 from planarm.model.arm import Arm
 from planarm.model.kinematics import forward
-from planarm.pipeline import judge_emulated_arm, judge_pins, plan_scene, stream
+from planarm.pipeline import judge_emulated_arm, judge_pins, plan_scene
 from planarm.scene import ObstacleMotion, load_scene
 from planarm.stepping.certify import certify
+from planarm.streaming import stream
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 
@@ -39,7 +40,7 @@ def environment(number, *, faster=1.0, smoothing="none"):
 def on_the_bench(plan):
     """Stream the plan to the emulated Uno; what the pins and the arm did."""
     with closing(open_transport("sim://", 250_000, ArmSetup(plan.scene, plan.segments.start_usteps))) as line:
-        stream(plan.segments, plan.certificate, line, quiet)
+        stream(plan.segments, plan.certificate, line, None)
         findings = judge_pins(plan.segments, line.pins)
         return findings, judge_emulated_arm(plan, findings, line.arm)
 
