@@ -10,7 +10,7 @@ from collections.abc import Callable
 from contextlib import closing
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,7 +27,8 @@ from planarm.errors import (
 )
 from planarm.fastest.task import fastest_path
 from planarm.link.arm_record import ArmSetup, ArmTrace
-from planarm.link.stream import StreamProgress
+from planarm.link.clock import Clock
+from planarm.link.stream import Stream, StreamProgress
 from planarm.link.transport import PinTrace, Transport, open_transport
 from planarm.model.arm import Arm
 from planarm.model.kinematics import forward
@@ -55,6 +56,23 @@ from planarm_wire.messages import DIR_PINS, STEP_PINS
 
 Notice = Callable[[str, float], None]
 """Told the stage and the share of it that is done."""
+
+
+class Onlooker(Protocol):
+    """Who watches a run while it goes on, and may hold, resume and stop it."""
+
+    def begin(self, plan: Plan, clock: Clock, *, emulated: bool) -> None:
+        """Take the plan; the motion begins when this comes back. `emulated`: the clock is an emulator's."""
+        ...
+
+    def note(self, told: StreamProgress) -> None:
+        """Take what the device tells."""
+        ...
+
+    def steer(self, stream: Stream) -> None:
+        """Called again and again while the motion goes on; may call the stream's hold, resume, override and stop."""
+        ...
+
 
 CURVE_POINTS = 400
 """Positions by which the curve of a motion is told in reports."""
@@ -195,6 +213,7 @@ def run_scene(
     *,
     faults: Path | None = None,
     fault_seed: int | None = None,
+    onlooker: Onlooker | None = None,
 ) -> dict[str, Any]:
     """Plan, stream, verify and report; return the summary.
 
@@ -205,6 +224,7 @@ def run_scene(
         notice: told the progress.
         faults: a schedule of what goes wrong around an emulated board (docs/faults.md).
         fault_seed: in place of the schedule's own.
+        onlooker: watches and steers the run while it goes on.
 
     Raises:
         PlanarmError: the branch of the tree tells which stage failed. Differing steps are reported first, then raised.
@@ -217,8 +237,12 @@ def run_scene(
         log = StreamLog(transport.clock.now_s)
         recorded = record(transport, out, port, scene)
         options = options_for(scene, plan.segments)
+        watch, steer = [log.note], None
+        if onlooker is not None:
+            onlooker.begin(plan, transport.clock, emulated=transport.pins is not None)
+            watch, steer = [log.note, onlooker.note], onlooker.steer
         try:
-            streamed = stream(plan.segments, plan.certificate, recorded, telling(notice, log.note), options)
+            streamed = stream(plan.segments, plan.certificate, recorded, telling(notice, *watch), options, steer=steer)
         except (LinkError, DeviceFault, HostKilledError, CertificateError, StepsDifferError) as error:
             seen = look_at(plan, transport, SETTLE_AFTER_FAILURE_S)
             for line in seen.notes() if log.samples else ():
@@ -258,12 +282,12 @@ def look_at(plan: Plan, transport: Transport, settle_s: float) -> Seen:
     return Seen(transport.pins, findings, arm, start_tick_of(planned, [joint.ticks for joint in findings.measured]))
 
 
-def telling(notice: Notice, watch: Callable[[StreamProgress], None] | None = None) -> Callable[[StreamProgress], None]:
-    """Return what tells a stream's progress as the share of its path time, and all of it to `watch`."""
+def telling(notice: Notice, *watchers: Callable[[StreamProgress], None]) -> Callable[[StreamProgress], None]:
+    """Return what tells a stream's progress as the share of its path time, and all of it to the watchers."""
 
     def tell(told: StreamProgress) -> None:
         notice("stream", told.path_s / told.total_s)
-        if watch is not None:
+        for watch in watchers:
             watch(told)
 
     return tell

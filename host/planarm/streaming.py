@@ -10,7 +10,7 @@ from planarm.errors import CertificateError
 from planarm.link.exchange import StreamResult, stream_plan
 from planarm.link.journal import JournalWriter
 from planarm.link.recording import RecordingTransport
-from planarm.link.stream import Joining, StreamOptions, StreamProgress
+from planarm.link.stream import Joining, Stream, StreamOptions, StreamProgress
 from planarm.link.transport import Transport
 from planarm.model.transmission import motor_axes
 from planarm.scene import Scene
@@ -56,8 +56,9 @@ def stream(
     on_progress: Callable[[StreamProgress], None] | None,
     options: StreamOptions | None = None,
     joining: Joining | None = None,
+    steer: Callable[[Stream], None] | None = None,
 ) -> StreamResult:
-    """Stream a certified plan and wait until the device has executed it.
+    """Stream a certified plan and wait until it is executed; `steer` may hold, resume and stop it meanwhile.
 
     Raises:
         CertificateError: The certificate is red; nothing is sent.
@@ -68,4 +69,4 @@ def stream(
     if not certificate.ok:
         raise CertificateError(certificate.explain())
     options = options or StreamOptions(allowances=plan.allowances)
-    return stream_plan(transport, plan.segments, on_progress, options, joining=joining)
+    return stream_plan(transport, plan.segments, on_progress, options, joining=joining, steer=steer)

@@ -190,6 +190,18 @@ ALLOWED: dict[str, set[str]] = {
         "planarm_wire",
     },
     "planarm.summary": {"planarm.arm_findings", "planarm.model", "planarm.link", "planarm.plan", "planarm_wire"},
+    # docs/decisions/0083: a run watched and steered while it goes on
+    "planarm.live": {"planarm.link", "planarm.model", "planarm.plan", "planarm_wire"},
+    # docs/decisions/0084: bringing an arm up
+    "planarm.bringup": {
+        "planarm.errors",
+        "planarm.model",
+        "planarm.scene",
+        "planarm.smoothing",
+        "planarm.stepping",
+        "planarm.trajectory",
+        "planarm_wire",
+    },
     "planarm.warm_up": {
         "planarm.link",
         "planarm.model",
@@ -248,6 +260,10 @@ ALLOWED: dict[str, set[str]] = {
     },
     "planarm.cli": {
         "planarm",
+        "planarm.bringup",
+        "planarm.live",
+        "planarm.plan",
+        "planarm.record",
         "planarm.alternatives",
         "planarm.errors",
         "planarm.explain",

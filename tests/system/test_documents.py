@@ -13,6 +13,8 @@ from planarm.cli.main import build_parser, main
 
 ROOT = Path(__file__).resolve().parents[2]
 README, TUTORIAL = ROOT / "README.md", ROOT / "docs" / "tutorial.md"
+PARSED_ONLY = [ROOT / "docs" / name for name in ("board.md", "live.md")]
+"""They need a board, or somebody who watches."""
 BOARD = "/dev/tty"
 
 
@@ -20,7 +22,7 @@ def typed(document):
     return [one.line for one in instructions(document) if isinstance(one, Typed)]
 
 
-@pytest.mark.parametrize("document", [README, TUTORIAL], ids=lambda p: p.stem)
+@pytest.mark.parametrize("document", [README, TUTORIAL, *PARSED_ONLY], ids=lambda p: p.stem)
 def test_the_command_line_takes_every_command(document):
     lines = typed(document)
     assert lines

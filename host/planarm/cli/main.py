@@ -95,6 +95,8 @@ def build_parser() -> argparse.ArgumentParser:
     _add_campaign(commands, "sweep", "plan or search many scenes and settings")
     _add_campaign(commands, "campaign", "run many emulated boards with faults")
     _add_report(commands)
+    _add_setup(commands)
+    _add_calibrate(commands)
     _add_explain(commands)
     _add_completion(commands)
     return parser
@@ -134,6 +136,13 @@ def _add_run(commands: Commands) -> None:
     command.add_argument("--out", metavar="DIR", help="folder for report.html, plan, trace, summary and pictures")
     command.add_argument("--faults", metavar="FILE", help="a schedule of what goes wrong around the emulated board")
     command.add_argument("--fault-seed", type=int, metavar="N", help="in place of the schedule's own seed")
+    command.add_argument(
+        "--live",
+        nargs="?",
+        const="page",
+        choices=("page", "terminal"),
+        help="watch and steer it: a page on this computer alone, or keys in this terminal",
+    )
     _add_json(command)
 
 
@@ -259,6 +268,29 @@ def _add_report(commands: Commands) -> None:
     )
     command.add_argument("results", metavar="DIR", help="the folder of the run or of the results")
     command.add_argument("--out", metavar="DIR", help="folder for report.html (the run's own) or for the plots")
+    _add_json(command)
+
+
+def _add_setup(commands: Commands) -> None:
+    command = commands.add_parser("setup", help="ask for an arm, try its joints, and write its scene")
+    command.add_argument("file", metavar="FILE.toml", help="the scene to write")
+    command.add_argument("--force", action="store_true", help="write over a file that is there")
+    _add_port(command)
+    _add_json(command)
+
+
+def _add_calibrate(commands: Commands) -> None:
+    command = commands.add_parser(
+        "calibrate",
+        help="link lengths and zero angles from touched points",
+        description="Fit link lengths and zero angles to at least four points that the tip has touched: read from a\n"
+        "CSV file with the head motor1_usteps,motor2_usteps,x_cm,y_cm, or with --port touched now.",
+    )
+    command.add_argument("scene", metavar="SCENE", help="the arm as it is thought to be")
+    command.add_argument("points", metavar="POINTS.csv", nargs="?", help="where motors and tip were")
+    command.add_argument("-o", "--output", metavar="NEW.toml", help="the scene with what was found, all else kept")
+    command.add_argument("--count", type=_count, default=6, metavar="N", help="points to touch with --port (6)")
+    _add_port(command)
     _add_json(command)
 
 

@@ -7,6 +7,7 @@ import json
 import shlex
 from pathlib import Path
 
+from planarm.cli.live import live_view
 from planarm.cli.progress import progress
 from planarm.cli.scenes import chosen_scene, compile_first
 from planarm.cli.terminal import terminal
@@ -21,14 +22,17 @@ def execute(options: argparse.Namespace) -> int:
     from planarm.warm_up import warm_up
 
     out = Path(options.out or Path("out") / f"{Path(scene.source).stem}-{scene.planner.algorithm}")
-    with progress(options.json) as notice:
+    with progress(options.json or options.live == "terminal") as notice:
         notice("kernels", 0.0)
         warm_up(on_roadmap=scene.planner.on_roadmap)
         notice("kernels", 1.0)
         port = scene.link.port if options.port is None else options.port
         faults = Path(options.faults) if options.faults else None
         try:
-            summary = run_scene(scene, port, out, notice, faults=faults, fault_seed=options.fault_seed)
+            with live_view(options.live) as onlooker:
+                summary = run_scene(
+                    scene, port, out, notice, faults=faults, fault_seed=options.fault_seed, onlooker=onlooker
+                )
         except PlanarmError as error:
             if faults is not None:
                 error.add_note(f"replay: {replay_line(options)}")

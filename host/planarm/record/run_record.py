@@ -31,15 +31,32 @@ def run_record(outcome: Outcome) -> dict[str, Any]:
     return {
         "format": FORMAT,
         "kind": "run",
+        **plan_record(plan),
+        "held_back": plan.timing.words(),
+        "verdict": _verdict(outcome),
+        "error": outcome.error,
+        "summary": dict(outcome.summary),
+        "limits": _limits(plan),
+        "joints": [pin_names(n) if n < len(STEP_PINS) else "" for n in range(len(scene.joints))],
+        "real": None if outcome.seen.arm is None else real_curves(outcome.seen.arm, scene),
+        "pins": _pins(outcome),
+        "timing": _timing(outcome),
+        "stream": _stream(outcome),
+        "events": events_of(outcome),
+        "certificate": [{"code": check_code(check.name), **asdict(check)} for check in plan.certificate.checks],
+    }
+
+
+def plan_record(plan: Plan) -> dict[str, Any]:
+    """Return what a page shows of a plan before it is executed: the workspace, the path, the motion."""
+    scene = plan.scene
+    return {
         "planarm": planarm.__version__,
         "wire": f"{SPEC_HASH:08x}",
         "title": scene.name,
         "source": scene.source,
         "planner": _planner_words(plan),
-        "held_back": plan.timing.words(),
-        "verdict": _verdict(outcome),
-        "error": outcome.error,
-        "summary": dict(outcome.summary),
+        "total_s": plan.segments.duration_ticks / TICKS_HZ,
         "arm": {
             "link_lengths_cm": list(scene.arm.link_lengths_cm),
             "link_width_cm": scene.arm.link_width_cm,
@@ -50,15 +67,7 @@ def run_record(outcome: Outcome) -> dict[str, Any]:
         "start_cm": list(scene.task.start_cm),
         "goal_cm": list(scene.task.goal_cm),
         "path_cm": columns(np.asarray(plan.path.points_cm), 4),
-        "limits": _limits(plan),
-        "joints": [pin_names(n) if n < len(STEP_PINS) else "" for n in range(len(scene.joints))],
         "planned": planned_curves(plan),
-        "real": None if outcome.seen.arm is None else real_curves(outcome.seen.arm, scene),
-        "pins": _pins(outcome),
-        "timing": _timing(outcome),
-        "stream": _stream(outcome),
-        "events": events_of(outcome),
-        "certificate": [{"code": check_code(check.name), **asdict(check)} for check in plan.certificate.checks],
     }
 
 

@@ -14,6 +14,8 @@ from typing import Any, Final
 
 RUN_STYLES: Final = ("base.css", "run.css")
 RUN_CODE: Final = ("dom.js", "plot.js", "workspace.js", "player.js", "events.js", "tables.js", "run.js")
+LIVE_STYLES: Final = ("base.css", "run.css", "live.css")
+LIVE_CODE: Final = ("dom.js", "plot.js", "workspace.js", "live.js")
 TIMING_STYLES: Final = ("base.css", "timing.css")
 TIMING_CODE: Final = ("dom.js", "plot.js", "events.js", "timing.js")
 
@@ -27,6 +29,15 @@ def run_page(record: Mapping[str, Any]) -> str:
     return page(f"{record['title']} – planarm", record, RUN_STYLES, RUN_CODE)
 
 
+def live_page(record: Mapping[str, Any]) -> str:
+    """Return the page of a run that is going on; it asks its own server for news.
+
+    Args:
+        record: what `planarm.record.run_record.plan_record` returns.
+    """
+    return page(f"{record['title']} – planarm live", record, LIVE_STYLES, LIVE_CODE, connect="'self'")
+
+
 def timing_page(record: Mapping[str, Any]) -> str:
     """Return the page of a timing report.
 
@@ -36,7 +47,9 @@ def timing_page(record: Mapping[str, Any]) -> str:
     return page(f"{record['title']} – planarm timing", record, TIMING_STYLES, TIMING_CODE)
 
 
-def page(title: str, record: Mapping[str, Any], styles: Sequence[str], code: Sequence[str]) -> str:
+def page(
+    title: str, record: Mapping[str, Any], styles: Sequence[str], code: Sequence[str], *, connect: str = "'none'"
+) -> str:
     """Return a page of the house's files around a record.
 
     Args:
@@ -44,8 +57,10 @@ def page(title: str, record: Mapping[str, Any], styles: Sequence[str], code: Seq
         record: its data, JSON's values.
         styles: style sheets beside this file, in order.
         code: scripts beside this file, in order.
+        connect: whom the page may ask: nobody, or 'self', its own server.
     """
     parts = {
+        "connect": connect,
         "title": html.escape(title),
         "css": "\n".join(_read(name) for name in styles),
         "js": "\n".join(_read(name) for name in code),
