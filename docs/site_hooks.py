@@ -23,6 +23,16 @@ INLINE = re.compile(r"(?<![\\$\w])\$([^$\n]+?)\$(?![\w$])")
 LINK = re.compile(r"(?<!!)\[([^\]]+)\]\(([^)#]+)(#[^)]*)?\)")
 
 
+def on_config(config: Any) -> Any:  # noqa: ANN401 - MkDocs' own types
+    """Put pages that the navigation does not name at its end, so that a new page is found without anybody's doing."""
+    named = str(config.nav)
+    pages = sorted(path.relative_to(DOCS).as_posix() for path in DOCS.rglob("*.md") if path.parent.name != "decisions")
+    omitted = [page for page in pages if f"'{page}'" not in named]
+    if omitted:
+        config.nav.append({"More": omitted})
+    return config
+
+
 def on_files(files: Any, config: Any) -> Any:  # noqa: ANN401 - MkDocs' own types
     """Add the pages that are made: all decisions, all commands."""
     files.append(File.generated(config, "decisions.md", content=decisions_page()))

@@ -62,7 +62,7 @@ def explanations() -> dict[str, Explanation]:
 def check_code(name: str) -> str:
     """Return the code of a check of the certificate by its name, which may name a joint; "" if none has it."""
     bare = _JOINT.sub("", name)
-    return next((e.code for e in explanations().values() if e.code[0] == "C" and e.title == bare), "")
+    return next((e.code for e in explanations().values() if e.code[0] == "C" and _names(e.title, bare)), "")
 
 
 def explain(asked: str) -> Explanation:
@@ -81,6 +81,11 @@ def explain(asked: str) -> Explanation:
         meant = f"; did you mean {near[0].upper() if len(near[0]) < 5 else repr(near[0])}?" if near else ""
         raise UsageError(f"nothing has the code {asked!r}{meant}; 'planarm explain' lists all")
     return by_word[word]
+
+
+def _names(title: str, name: str) -> bool:
+    """Tell whether a check's name is a title, or one with a circumstance behind it, such as ", 0.2 s late"."""
+    return name == title or name.startswith(f"{title},")
 
 
 def _word(name: str) -> str:

@@ -1,6 +1,7 @@
 """A run's record: what a page shows of it, held against the stages' own values."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -16,7 +17,7 @@ from planarm.record.histograms import interval_histogram, width_histogram
 from planarm.record.outcome import Outcome, StreamSample
 from planarm.record.run_record import run_record
 from planarm.run_folder import read_record
-from planarm.scene import load_scene
+from planarm.scene import ObstacleMotion, load_scene
 
 SCENARIOS = Path(__file__).resolve().parents[1] / "scenarios"
 SCENE = load_scene(SCENARIOS / "arm.toml")
@@ -135,3 +136,14 @@ def test_on_a_real_port_time_comes_from_what_the_device_told(plan):
     record = run_record(outcome)
     assert record["real"] is None and record["pins"] is None and record["timing"]["errors"] is None
     assert record["timing"]["intervals"] is not None, "as planned"
+
+
+def test_a_moving_obstacle_is_told_where_it_is_over_time(plan):
+    motion = ObstacleMotion((0.0, 1.0), ((0.0, 0.0), (4.0, -2.0)), False)
+    [obstacle] = plan.scene.obstacles
+    scene = replace(plan.scene, obstacles=(replace(obstacle, motion=motion),))
+    [told] = run_record(Outcome(replace(plan, scene=scene), {}))["obstacles"]
+    times, (dx, dy) = np.array(told["motion"]["t_s"]), told["motion"]["offset_cm"]
+    np.testing.assert_allclose(dx, 4.0 * np.minimum(times, 1.0), atol=1e-3)
+    np.testing.assert_allclose(dy, -2.0 * np.minimum(times, 1.0), atol=1e-3)
+    assert times[-1] > plan.trajectory.duration_s

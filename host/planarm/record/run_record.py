@@ -10,18 +10,22 @@ from numpy.typing import NDArray
 
 import planarm
 from planarm.explain import check_code
+from planarm.model.moving import offset_cm
 from planarm.model.shapes import Circle, shape_of
 from planarm.plan import Plan
 from planarm.record.curves import columns, pin_curves, planned_curves, real_curves, rounded
 from planarm.record.events import events_of
 from planarm.record.histograms import error_histogram, interval_histogram, pin_names, width_histogram
 from planarm.record.outcome import Outcome
+from planarm.scene import Obstacle
 from planarm.workspace.free_map import FreeMap
 from planarm_wire.messages import MIN_INTERVAL_TICKS, SPEC_HASH, STEP_PINS, TICKS_HZ
 
 FORMAT = 1
 MOST_CELLS = 160_000
 """Cells of a map that are told; a finer one is thinned out."""
+MOVES_TOLD, AFTER_S = 300, 1.0
+"""Moments at which a moving obstacle is told, and how long after the motion's end."""
 REGIONS = ("free", "beyond reach", "inner hole", "blocked by an obstacle", "joint limit or floor")
 
 
@@ -63,7 +67,7 @@ def plan_record(plan: Plan) -> dict[str, Any]:
             "base_cm": list(scene.arm.base_cm),
         },
         "map": _map(plan.free_map),
-        "obstacles": [_outline(shape_of(obstacle)) for obstacle in scene.obstacles],
+        "obstacles": [_outline(obstacle, plan.trajectory.duration_s) for obstacle in scene.obstacles],
         "start_cm": list(scene.task.start_cm),
         "goal_cm": list(scene.task.goal_cm),
         "path_cm": columns(np.asarray(plan.path.points_cm), 4),
@@ -132,10 +136,18 @@ def _runs(region: NDArray[np.uint8]) -> list[list[int]]:
     return [table[flat[first] == code].ravel().tolist() for code in range(len(REGIONS))]
 
 
-def _outline(shape: Any) -> dict[str, Any]:  # noqa: ANN401 - a circle or a polygon
+def _outline(obstacle: Obstacle, duration_s: float) -> dict[str, Any]:
+    """Return an obstacle where it stands at time 0, and how far it has moved from there at even times, if it moves."""
+    shape = shape_of(obstacle)
     if isinstance(shape, Circle):
-        return {"center_cm": list(shape.center_cm), "radius_cm": shape.radius_cm}
-    return {"vertices_cm": [list(vertex) for vertex in shape.vertices_cm]}
+        told: dict[str, Any] = {"center_cm": list(shape.center_cm), "radius_cm": shape.radius_cm}
+    else:
+        told = {"vertices_cm": [list(vertex) for vertex in shape.vertices_cm]}
+    if obstacle.motion is None:
+        return told
+    t_s = np.linspace(0.0, duration_s + AFTER_S, MOVES_TOLD)
+    offsets = np.array([offset_cm(obstacle.motion, float(t)) for t in t_s])
+    return {**told, "motion": {"t_s": rounded(t_s, 5), "offset_cm": columns(offsets, 4)}}
 
 
 def _pins(outcome: Outcome) -> dict[str, Any] | None:

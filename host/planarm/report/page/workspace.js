@@ -26,6 +26,7 @@ class Workspace {
     this.tip = paired(planned.tip_cm);
     this.realTip = real ? paired(real.tip_cm) : [];
     this.strays = real !== null && Math.max(...real.tip_error_mm) > 10 * APART_CM;
+    this.movers = []; // obstacles that move, with where they are when
     const box = this.box();
     this.svg = s("svg", { class: "map", viewBox: `${box.x} ${-box.y - box.h} ${box.w} ${box.h}`, role: "img", "aria-label": this.words() });
     this.wide = box.w;
@@ -106,7 +107,9 @@ class Workspace {
       const center = points ? [0, 1].map((k) => points.reduce((sum, p) => sum + p[k], 0) / points.length) : one.center_cm;
       const shape = points ? s("polygon", { class: "obstacle", points: placed(points) })
         : s("circle", { class: "obstacle", cx: center[0], cy: -center[1], r: one.radius_cm });
-      return [shape, s("text", { class: "on", x: center[0], y: -center[1] }, i + 1)];
+      const group = s("g", {}, shape, s("text", { class: "on", x: center[0], y: -center[1] }, i + 1));
+      if (one.motion) this.movers.push([group, one.motion]);
+      return group;
     });
   }
 
@@ -157,6 +160,10 @@ class Workspace {
   at(t) {
     const { planned, real, arm } = this.record;
     const now = (curves) => curves.q_deg.map((q) => valueAt(curves.t_s, q, Math.min(Math.max(t, curves.t_s[0]), curves.t_s.at(-1))));
+    for (const [group, { t_s: times, offset_cm: [dx, dy] }] of this.movers) {
+      const at = Math.min(Math.max(t, times[0]), times.at(-1));
+      group.setAttribute("transform", `translate(${valueAt(times, dx, at)} ${-valueAt(times, dy, at)})`);
+    }
     const points = forward(arm, now(planned));
     this.show(points, this.links, this.hinges, "hinge");
     this.casing.setAttribute("points", placed(points));
