@@ -22,6 +22,33 @@ from planarm.scene import (
 FULL_TURN = ((radians(-90), radians(270)), (-pi, pi))
 
 
+LEAST = """
+[arm]
+link_lengths_cm = [30, 20]
+link_width_cm = 0.8
+elbow = "up"
+[workspace]
+x_cm = [-50, 50]
+y_cm = [0, 50]
+[task]
+start_cm = [49, 2]
+goal_cm = [1, 45]
+[[joints]]
+max_speed_deg_s = 180
+max_acceleration_deg_s2 = 360
+{first}
+[[joints]]
+max_speed_deg_s = 90
+max_acceleration_deg_s2 = 720
+{second}
+"""
+
+
+def least_scene(first="", second=""):
+    """The text of a scene with what must be in one, and more lines for each joint."""
+    return LEAST.format(first=first, second=second)
+
+
 def make_scene(
     obstacles=(),
     *,

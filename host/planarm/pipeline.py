@@ -26,6 +26,7 @@ from planarm.errors import (
     TimingError,
 )
 from planarm.fastest.task import fastest_path
+from planarm.gentle import ROOM_CM, gentle_motion, jerk_limits
 from planarm.link.arm_record import ArmSetup, ArmTrace
 from planarm.link.clock import Clock
 from planarm.link.stream import Stream, StreamProgress
@@ -104,6 +105,11 @@ def plan_scene(scene: Scene, notice: Notice) -> Plan:
     if scene.planner.objective == "time":
         trajectory = optimised(scene, margin_cm, trajectory, limits, notice)
         path, bound_cm = TipPath.through(tip_curve_cm(trajectory, Arm.from_spec(scene.arm)), path.elbow), None
+    timing = report_timing(trajectory, limits)
+    jerks = jerk_limits(scene)
+    if jerks is not None:
+        trajectory = gentle_motion(scene, margin_cm - ROOM_CM, trajectory, limits, jerks)
+        timing = replace(timing, duration_s=trajectory.duration_s)
     fastest = trajectory
     notice("plan", 0.6)
     trajectory, train, segments = schedule(scene, lambda limit: timed(scene, fastest, limits, limit))
@@ -120,7 +126,7 @@ def plan_scene(scene: Scene, notice: Notice) -> Plan:
         segments,
         certificate,
         plan_ms=1e3 * (time.perf_counter() - began_s),
-        timing=report_timing(trajectory, limits),
+        timing=timing,
         search_ms=1e3 * route.search_s,
         joint=route.joint,
         bound_cm=bound_cm,
@@ -190,8 +196,12 @@ def tip_curve_cm(trajectory: Trajectory, arm: Arm) -> NDArray[np.float64]:
 
 
 def planning_margin_cm(scene: Scene) -> float:
-    """Return the margin that plans keep: the scene's, and half a micro-step in every joint (docs/decisions/0005)."""
-    return scene.margin_cm + quantisation_bound_cm(Arm.from_spec(scene.arm), scene.joints, scene.coupling)
+    """Return the margin that plans keep: the scene's, and half a micro-step in every joint (docs/decisions/0005).
+
+    With a limit of jerk there is room for what the motion then cuts (docs/decisions/0087).
+    """
+    steps_cm = quantisation_bound_cm(Arm.from_spec(scene.arm), scene.joints, scene.coupling)
+    return scene.margin_cm + steps_cm + (0.0 if jerk_limits(scene) is None else ROOM_CM)
 
 
 def stored(plan: Plan) -> StoredPlan:

@@ -120,8 +120,17 @@ ALLOWED: dict[str, set[str]] = {
         "planarm.trajectory",
         "planarm.route",
     },
+    "planarm.gentle": {
+        "planarm.errors",
+        "planarm.scene",
+        "planarm.model",
+        "planarm.workspace",
+        "planarm.smoothing",
+        "planarm.trajectory",
+    },
     "planarm.pipeline": {
         "planarm",
+        "planarm.gentle",
         "planarm.arm_findings",
         "planarm.errors",
         "planarm.scene",

@@ -5,29 +5,13 @@ from pathlib import Path
 
 import pytest
 
+from host_scenes import least_scene
 from planarm.errors import SceneError
 from planarm.scene import MotionSpec, Obstacle, PlannerSpec, load_scene, parse_scene, with_planner
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 
-LEAST = """
-[arm]
-link_lengths_cm = [30, 20]
-link_width_cm = 0.8
-elbow = "up"
-[workspace]
-x_cm = [-50, 50]
-y_cm = [0, 50]
-[task]
-start_cm = [49, 2]
-goal_cm = [1, 45]
-[[joints]]
-max_speed_deg_s = 180
-max_acceleration_deg_s2 = 360
-[[joints]]
-max_speed_deg_s = 90
-max_acceleration_deg_s2 = 720
-"""
+LEAST = least_scene()
 
 
 def test_the_least_scene_has_the_documented_defaults():

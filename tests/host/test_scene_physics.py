@@ -4,33 +4,13 @@ from math import pi, sqrt
 
 import pytest
 
+from host_scenes import least_scene
 from planarm.errors import SceneError
 from planarm.scene import MotorSpec, parse_scene
 
-SCENE = """
-[arm]
-link_lengths_cm = [30, 20]
-link_width_cm = 0.8
-elbow = "up"
-[workspace]
-x_cm = [-50, 50]
-y_cm = [0, 50]
-[task]
-start_cm = [49, 2]
-goal_cm = [1, 45]
-[[joints]]
-max_speed_deg_s = 180
-max_acceleration_deg_s2 = 360
-{first}
-[[joints]]
-max_speed_deg_s = 90
-max_acceleration_deg_s2 = 720
-{second}
-"""
-
 
 def scene_with(first="", second="", rest=""):
-    return parse_scene(SCENE.format(first=first, second=second) + rest, "arm.toml")
+    return parse_scene(least_scene(first, second) + rest, "arm.toml")
 
 
 def test_a_scene_without_physical_data_is_an_aluminium_arm_on_a_table_with_common_motors():

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from planarm.scene import PlannerSpec, Point
 from planarm.search.grid_search import find_path
+from planarm.search.heap import rise, sink
 from planarm.search.path import Path
 from planarm.workspace.free_map import FreeMap
 from planarm.workspace.proof import PROVED, prove_line
@@ -82,7 +83,7 @@ def _search(world: ArmWorld, nodes: Floats, start: int, goal: int, bound_cm: flo
     while heaped > 0:
         entry = heap[0]
         heaped -= 1
-        _sink(heap, heaped, heap[heaped], f_of)
+        sink(heap, heaped, heap[heaped], f_of)
         u, a = target[entry], source[entry]
         if closed[u]:
             continue
@@ -107,32 +108,10 @@ def _search(world: ArmWorld, nodes: Floats, start: int, goal: int, bound_cm: flo
                 )
                 heap = np.append(heap, np.empty(made, np.int64))
             f_of[made], g_of[made], source[made], target[made] = f, g, u, v
-            _rise(heap, heaped, made, f_of)
+            rise(heap, heaped, made, f_of)
             made, heaped = made + 1, heaped + 1
     chain, place = [goal], goal
     while before[place] != NONE:
         place = before[place]
         chain.append(place)
     return np.array(chain[::-1])
-
-
-@kernel
-def _rise(heap: Ints, size: int, entry: int, f_of: Floats) -> None:
-    place = size
-    while place > 0 and f_of[heap[(place - 1) >> 1]] > f_of[entry]:
-        heap[place] = heap[(place - 1) >> 1]
-        place = (place - 1) >> 1
-    heap[place] = entry
-
-
-@kernel
-def _sink(heap: Ints, size: int, entry: int, f_of: Floats) -> None:
-    place, child = 0, 1
-    while child < size:
-        if child + 1 < size and f_of[heap[child + 1]] < f_of[heap[child]]:
-            child += 1
-        if f_of[entry] <= f_of[heap[child]]:
-            break
-        heap[place] = heap[child]
-        place, child = child, 2 * child + 1
-    heap[place] = entry

@@ -65,6 +65,7 @@ JOINT_KEYS = (
     "driver",
     "max_speed_deg_s",
     "max_acceleration_deg_s2",
+    "max_jerk_deg_s3",
     "reversed",
     "zero_offset_deg",
     "motor",
@@ -315,6 +316,7 @@ def _joints(root: Table, links: int) -> tuple[JointSpec, ...]:
 
 
 def _joint(table: Table) -> JointSpec:
+    jerk = table.number("max_jerk_deg_s3", 0.0, at_least=0.0, at_most=1e9)
     return JointSpec(
         steps_per_rev=table.integer("steps_per_rev", 200, at_least=1, at_most=100_000),
         microsteps=table.integer("microsteps", 16, at_least=1, at_most=256),
@@ -325,6 +327,7 @@ def _joint(table: Table) -> JointSpec:
         reversed=table.flag("reversed", False),
         zero_offset_rad=radians(table.number("zero_offset_deg", 0.0, at_least=-720.0, at_most=720.0)),
         motor=parse_motor(table.table("motor", MOTOR_KEYS, optional=True)),
+        max_jerk_rad_s3=radians(jerk) if jerk > 0.0 else None,
     )
 
 

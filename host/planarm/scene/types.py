@@ -129,7 +129,7 @@ class JointSpec:
     """A joint's stepper motor, gear and limits.
 
     `reversed` is True when the motor's positive sense turns the joint clockwise; `zero_offset_rad` is the joint's angle
-    when all motors stand at micro-step 0.
+    when all motors stand at micro-step 0. `max_jerk_rad_s3` is None where jerk has no limit.
     """
 
     steps_per_rev: int
@@ -141,6 +141,7 @@ class JointSpec:
     reversed: bool = False
     zero_offset_rad: float = 0.0
     motor: MotorSpec = field(default_factory=MotorSpec)
+    max_jerk_rad_s3: float | None = None
 
     @property
     def usteps_per_rad(self) -> float:

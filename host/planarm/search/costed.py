@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from planarm.search.best_first import SHUT, Found, Lattice, Moves, Rules, move_is_legal, node_cm
+from planarm.search.heap import insert, remove_first
 from planarm.search.open_list import NONE
-from planarm.search.theta import heap_insert, heap_remove_first
 from planarm.workspace.world import ArmWorld, cos_beta_at, theta1_at, theta2_at
 from planarm_wire.kernel_cache import kernel
 
@@ -67,7 +67,7 @@ def _search(
     expanded, generated = 0, 1
     while size > 0:
         node = heap_node[0]
-        size = heap_remove_first(heap_f, heap_node, size)
+        size = remove_first(heap_f, heap_node, size)
         if closed[node]:
             continue
         closed[node] = True
@@ -86,7 +86,7 @@ def _search(
             if size == heap_f.size:
                 heap_f, heap_node = np.append(heap_f, heap_f), np.append(heap_node, heap_node)
             ahead = price_of(price, first[goal] - first[to], second[goal] - second[to])
-            heap_insert(heap_f, heap_node, size, through + ahead, to)
+            insert(heap_f, heap_node, size, through + ahead, to)
             size += 1
             generated += 1
     return before, g[goal] if closed[goal] else inf, expanded, generated

@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from planarm.search.heap import rise, sink
 from planarm.workspace.joint_proof import JointWorld, pose_spare_cm, prove_pieces
 from planarm.workspace.proof import PROVED
 from planarm_wire.kernel_cache import kernel
@@ -176,7 +177,7 @@ def search_joints(world: JointWorld, lattice: JointLattice, costs: Costs, dx: In
     while heaped > 0:
         entry = heap[0]
         heaped -= 1
-        _sink(heap, heaped, heap[heaped], f_of)
+        sink(heap, heaped, heap[heaped], f_of)
         node, source = made_to[entry], made_from[entry]
         if closed[node]:
             continue
@@ -204,7 +205,7 @@ def search_joints(world: JointWorld, lattice: JointLattice, costs: Costs, dx: In
             for goal in range(lattice.goals):
                 h = min(h, least_cost(world, costs, t1, t2, lattice.given_rad[goal, 0], lattice.given_rad[goal, 1]))
             f_of[made], g_of[made], made_from[made], made_to[made] = g_to + h, g_to, node, to
-            _rise(heap, heaped, made, f_of)
+            rise(heap, heaped, made, f_of)
             made, heaped = made + 1, heaped + 1
     return np.empty(0, np.int64), expanded, made
 
@@ -269,31 +270,6 @@ def _trace(before: Ints, last: int) -> Ints:
         chain[k] = place
         place = before[place]
     return chain
-
-
-@kernel
-def _rise(heap: Ints, size: int, entry: int, f_of: Floats) -> None:
-    place = size
-    while place > 0:
-        above = heap[(place - 1) >> 1]
-        if f_of[above] <= f_of[entry]:
-            break
-        heap[place] = above
-        place = (place - 1) >> 1
-    heap[place] = entry
-
-
-@kernel
-def _sink(heap: Ints, size: int, entry: int, f_of: Floats) -> None:
-    place, child = 0, 1
-    while child < size:
-        if child + 1 < size and f_of[heap[child + 1]] < f_of[heap[child]]:
-            child += 1
-        if f_of[entry] <= f_of[heap[child]]:
-            break
-        heap[place] = heap[child]
-        place, child = child, 2 * child + 1
-    heap[place] = entry
 
 
 @kernel

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from planarm.search.best_first import SHUT, Found, Lattice, Moves, Rules, move_is_legal
+from planarm.search.heap import insert, remove_first
 from planarm.search.open_list import NONE
 from planarm.search.sight import in_sight
 from planarm.search.taut import leg_cells
@@ -44,7 +45,7 @@ def _search(
     expanded, generated = 0, 1
     while size > 0:
         node = heap_node[0]
-        size = heap_remove_first(heap_f, heap_node, size)
+        size = remove_first(heap_f, heap_node, size)
         if closed[node]:
             continue
         x, y, parent = float(node % width), float(node // width), before[node]
@@ -79,35 +80,9 @@ def _search(
                 g[to], before[to] = through, source
                 if size == heap_f.size:
                     heap_f, heap_node = np.append(heap_f, heap_f), np.append(heap_node, heap_node)
-                heap_insert(heap_f, heap_node, size, through + leg_cells(to_x, to_y, goal_x, goal_y), to)
+                insert(heap_f, heap_node, size, through + leg_cells(to_x, to_y, goal_x, goal_y), to)
                 size += 1
                 generated += 1
     if not closed[goal]:
         before[goal] = NONE
     return before, expanded, generated
-
-
-@kernel
-def heap_insert(heap_f: Floats, heap_node: Ints, size: int, f: float, node: int) -> None:
-    """Put an entry into a binary heap of `size` entries."""
-    place = size
-    while place > 0 and heap_f[(place - 1) >> 1] > f:
-        heap_f[place], heap_node[place] = heap_f[(place - 1) >> 1], heap_node[(place - 1) >> 1]
-        place = (place - 1) >> 1
-    heap_f[place], heap_node[place] = f, node
-
-
-@kernel
-def heap_remove_first(heap_f: Floats, heap_node: Ints, size: int) -> int:
-    """Take the first entry off a binary heap; return the number of entries left."""
-    size -= 1
-    f, node, place, child = heap_f[size], heap_node[size], 0, 1
-    while child < size:
-        if child + 1 < size and heap_f[child + 1] < heap_f[child]:
-            child += 1
-        if heap_f[child] >= f:
-            break
-        heap_f[place], heap_node[place] = heap_f[child], heap_node[child]
-        place, child = child, 2 * child + 1
-    heap_f[place], heap_node[place] = f, node
-    return size
