@@ -7,10 +7,12 @@ import pytest
 
 from host_scenes import make_scene
 from motion_paths import joint, joint_line
+from planarm.model.arm import Arm
 from planarm.stepping.check_motion import Planned, check_deviation, check_limits
 from planarm.stepping.poses import motor_positions
 from planarm.stepping.quantise import quantise
 from planarm.stepping.train import JointSteps
+from planarm.trajectory.jerk import averaged
 from planarm.trajectory.timing import time_path
 
 JOINTS = (joint(), joint(1.5, 8.0))
@@ -29,6 +31,17 @@ def test_planned_speeds_and_accelerations_are_those_of_the_motion(motion):
     assert values["joint 2 planned acceleration"] == pytest.approx(6.4, rel=1e-3)
     assert values["joint 1 planned speed"] == pytest.approx(1.25, rel=1e-3)
     assert values["joint 1 planned acceleration"] == pytest.approx(6.4 / 1.2, rel=1e-3)
+
+
+@pytest.mark.parametrize(("limit", "verdict"), [(90.0, "green"), (80.0, "green"), (79.0, "red")])
+def test_jerk_is_looked_at_where_it_has_a_limit(motion, limit, verdict):
+    smooth = averaged(motion, Arm((30.0, 20.0), (0.0, 0.0), ((-4.0, 4.0),) * 2), np.array([np.inf, 80.0]))
+    joints = (JOINTS[0], replace(JOINTS[1], max_jerk_rad_s3=limit))
+    checks = {check.name: check for check in check_limits(Planned.of(smooth), joints)}
+    assert "joint 1 planned jerk" not in checks
+    assert checks["joint 2 planned jerk"].verdict == verdict
+    assert checks["joint 2 planned jerk"].value == pytest.approx(80.0, rel=5e-3)
+    assert check_limits(Planned.of(motion), joints)[-1].verdict == "red"  # the motion itself jumps
 
 
 @pytest.mark.parametrize(("shift_ticks", "verdict"), [(0, "green"), (1000, "red"), (-1000, "red")])

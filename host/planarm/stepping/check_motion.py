@@ -23,6 +23,9 @@ LEAST_POINTS = 1_000
 ROUNDING = 1e-6
 """Share of a limit by which differences of doubles may miss it: 1e-16 rad over (0.1 ms)^2 is 1e-8 rad/s^2."""
 
+JERK_ROUNDING_RAD_S3 = 0.05
+"""By how much third differences of doubles may miss a jerk: 8 x 1e-15 rad over (0.1 ms)^3 is 0.01 rad/s^3."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Planned:
@@ -53,9 +56,14 @@ class Planned:
         """Acceleration around each inner time, shape (n - 2, joints)."""
         return np.asarray(np.diff(self.q_rad, n=2, axis=0) / self.t_s[1] ** 2)
 
+    @property
+    def jerks_rad_s3(self) -> Floats:
+        """Jerk around the middle of each three neighbouring intervals, shape (n - 3, joints)."""
+        return np.asarray(np.diff(self.q_rad, n=3, axis=0) / self.t_s[1] ** 3)
+
 
 def check_limits(planned: Planned, joints: tuple[JointSpec, ...]) -> list[Check]:
-    """Check each joint's planned speed and acceleration."""
+    """Check each joint's planned speed and acceleration, and its jerk where that has a limit."""
     t_s = planned.t_s
     speeds, accelerations = np.abs(planned.speeds_rad_s), np.abs(planned.accelerations_rad_s2)
     checks = []
@@ -70,7 +78,16 @@ def check_limits(planned: Planned, joints: tuple[JointSpec, ...]) -> list[Check]
             checks.append(
                 at_most(f"joint {number} planned {name}", value, limit, unit, where, setting, limit * ROUNDING)
             )
+        if joint.max_jerk_rad_s3 is not None:
+            checks.append(_check_jerk(planned, number, joint.max_jerk_rad_s3))
     return checks
+
+
+def _check_jerk(planned: Planned, number: int, limit: float) -> Check:
+    jerks = np.abs(planned.jerks_rad_s3[:, number - 1])
+    worst = int(np.argmax(jerks))
+    where, setting = f"{planned.t_s[worst]:.6f} s", f"joints[{number}].max_jerk_deg_s3"
+    return at_most(f"joint {number} planned jerk", jerks[worst], limit, "rad/s^3", where, setting, JERK_ROUNDING_RAD_S3)
 
 
 def check_deviation(trajectory: Trajectory, scene: Scene, made: StepTrain, at: MotorPositions) -> list[Check]:
