@@ -10,7 +10,7 @@ from planarm.scene import PlannerSpec
 from planarm.search.best_first import CELLS, PROOF, Lattice
 from planarm.search.endpoints import JOIN_CELLS, Endpoint
 from planarm.search.lattice import make_lattice, node_at, nodes_cm
-from planarm.search.optimum import BORDER, lower_bound_cells, optimal_nodes
+from planarm.search.optimum import BORDER, MOST_ASKED, MOST_NODES, lower_bound_cells, optimal_nodes
 from planarm.search.path import Path
 from planarm.workspace.free_map import FreeMap
 
@@ -37,7 +37,7 @@ def optimal_path(free_map: FreeMap, path: Path, start: Endpoint, goal: Endpoint,
     if not (start.on_node and goal.on_node) or len(path.points_cm) == 1:
         return None
     lattice = make_lattice(free_map, BORDER)
-    nodes = _better(lattice, free_map, path, start, goal, planner)
+    nodes = _better(lattice, free_map, path, (start, goal), planner, MOST_ASKED)
     return None if nodes is None or not len(nodes) else Path.through(nodes_cm(lattice, nodes), free_map.elbow)
 
 
@@ -53,7 +53,7 @@ def path_bound_cm(free_map: FreeMap, path: Path, start: Endpoint, goal: Endpoint
     aside = 1 if on_nodes else ASIDE
     lattice = make_lattice(free_map, BORDER - 1 + aside)
     if on_nodes and free_map.free_nodes <= SMALL_MAP and planner.algorithm in NEAR_OPTIMAL:
-        better = _better(lattice, free_map, path, start, goal, planner)
+        better = _better(lattice, free_map, path, (start, goal), planner, MOST_NODES)
         if better is not None:
             best = Path.through(nodes_cm(lattice, better), free_map.elbow) if len(better) else path
             return max(straight_cm, best.length_cm)
@@ -64,11 +64,17 @@ def path_bound_cm(free_map: FreeMap, path: Path, start: Endpoint, goal: Endpoint
 
 
 def _better(
-    lattice: Lattice, free_map: FreeMap, path: Path, start: Endpoint, goal: Endpoint, planner: PlannerSpec
+    lattice: Lattice,
+    free_map: FreeMap,
+    path: Path,
+    ends: tuple[Endpoint, Endpoint],
+    planner: PlannerSpec,
+    most_nodes: int,
 ) -> NDArray[np.int64] | None:
-    ends = [node_at(lattice, end.column, end.row) for end in (start, goal)]
+    first, last = (node_at(lattice, end.column, end.row) for end in ends)
     legal = PROOF if planner.moves == "proved" else CELLS
-    return optimal_nodes(lattice, free_map.world, legal, ends[0], ends[1], path.length_cm / free_map.cell_cm)
+    known_cells = path.length_cm / free_map.cell_cm
+    return optimal_nodes(lattice, free_map.world, legal, (first, last), known_cells, most_nodes)
 
 
 def _join_cm(free_map: FreeMap, end: Endpoint) -> float:

@@ -42,7 +42,10 @@ SHORTER_CELLS: Final = 1e-7
 """What counts as shorter: beyond the rounding of costs."""
 
 MOST_NODES: Final = 3000
-"""Between more nodes than these the optimum is not looked for."""
+"""Between more nodes than these the optimum is not looked for to bound a path."""
+
+MOST_ASKED: Final = 20_000
+"""Nor between more than these when it is asked for: that may take seconds."""
 
 
 def excess() -> float:
@@ -72,7 +75,7 @@ def lower_bound_cells(lattice: Lattice, world: ArmWorld, start: int, goal: int, 
 
 
 def optimal_nodes(
-    lattice: Lattice, world: ArmWorld, legal: int, start: int, goal: int, known_cells: float
+    lattice: Lattice, world: ArmWorld, legal: int, ends: tuple[int, int], known_cells: float, most_nodes: int
 ) -> Ints | None:
     """Return the shortest chain of legs in sight, empty when none is shorter than `known_cells`; None if it takes long.
 
@@ -80,17 +83,18 @@ def optimal_nodes(
         lattice: the map with a border of at least BORDER.
         world: the arm, for proofs.
         legal: CELLS or PROOF, as in `planarm.search.best_first.Rules`.
-        start: a free node.
-        goal: a free node.
+        ends: a free node at the start, and one at the goal.
         known_cells: length of a known path; the longer it is, the longer this takes.
+        most_nodes: with more nodes that a shorter path may pass, the answer is None.
     """
+    start, goal = ends
     near = near_room(lattice, 1)
     moves = make_moves(_STENCIL, near)
     from_start, to_goal = (flood(near, moves, world, node) / (UNITS_PER_CELL * excess()) for node in (start, goal))
     worth = (lattice.room != 0) & (from_start + to_goal < known_cells + SHORTER_CELLS)
     worth[[start, goal]] = True
     nodes = np.flatnonzero(worth)
-    if len(nodes) > MOST_NODES:
+    if len(nodes) > most_nodes:
         return None
     places = {int(node): place for place, node in enumerate(nodes)}
     y, x = np.divmod(nodes, lattice.width)
