@@ -10,6 +10,7 @@ most a T^2 / 24 in a joint: whoever uses it has to prove the result free.
 from math import ceil
 
 import numpy as np
+from numpy.typing import NDArray
 
 from planarm.errors import TimingError
 from planarm.model.arm import Arm
@@ -49,7 +50,7 @@ def averaged(trajectory: Trajectory, arm: Arm, jerks_rad_s3: Floats) -> Trajecto
     rate = _integral(0.5 * (bend[:-1] + bend[1:]))
     angle = trajectory.q_rad[0] + _integral(rate[:-1] + STEP_S * (bend[:-1] / 2.0 + STEP_S * jerk / 6.0))
     pieces = np.stack([angle[:-1], rate[:-1], 0.5 * bend[:-1], jerk / 6.0], axis=1)
-    borders = STEP_S * np.arange(len(angle))
+    borders = STEP_S * np.arange(len(angle), dtype=np.float64)
     path = JointSpline(arm, borders, np.ascontiguousarray(pieces), np.zeros(0))
     return Trajectory(path, borders, borders, np.ones(len(borders)), angle)
 
@@ -92,11 +93,13 @@ def _window(accelerations: Floats, jerks_rad_s3: Floats) -> int:
     return high
 
 
-def _keeps(accelerations: Floats, window: int, jerks_rad_s3: Floats) -> np.ndarray:
+def _keeps(accelerations: Floats, window: int, jerks_rad_s3: Floats) -> NDArray[np.bool_]:
+    """Tell for each joint whether the mean over so many steps keeps its jerk."""
     rest = np.zeros((window, accelerations.shape[1]))
     change = np.concatenate([accelerations, rest]) - np.concatenate([rest, accelerations])
     return np.asarray(np.abs(change).max(axis=0) <= jerks_rad_s3 * window * STEP_S)
 
 
 def _integral(values: Floats) -> Floats:
-    return np.concatenate([np.zeros((1, values.shape[1])), np.cumsum(STEP_S * values, axis=0)])
+    sums = np.cumsum(STEP_S * values, axis=0)
+    return np.asarray(np.concatenate([np.zeros((1, values.shape[1])), sums]), np.float64)
