@@ -110,9 +110,13 @@ def plan_scene(scene: Scene, notice: Notice) -> Plan:
     if jerks is not None:
         trajectory = gentle_motion(scene, margin_cm - ROOM_CM, trajectory, limits, jerks)
         timing = replace(timing, duration_s=trajectory.duration_s)
-    fastest = trajectory
+    fastest, averaged = trajectory, jerks is not None
     notice("plan", 0.6)
-    trajectory, train, segments = schedule(scene, lambda limit: timed(scene, fastest, limits, limit))
+    trajectory, train, segments = schedule(
+        # A motion with a limit of jerk is not timed anew: where a stop lacks road, the device slows down by itself.
+        scene,
+        lambda limit: timed(scene, fastest, limits, None if averaged else limit),
+    )
     notice("plan", 0.8)
     certificate = certify(scene, trajectory, train, segments)
     notice("plan", 1.0)
