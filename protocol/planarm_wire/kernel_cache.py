@@ -46,7 +46,8 @@ F = TypeVar("F", bound=Callable[..., Any])
 
 CACHE_DIR_VARIABLE = "PLANARM_CACHE_DIR"
 KEPT_BUILDS = 16
-_BLAS = "scipy.linalg.cython_blas"
+_ALGEBRA = (b"numba_xx", b"numba_ez")
+"""How the names of Numba's ways to BLAS and LAPACK begin."""
 
 _DECORATED = re.compile(rb"^@kernel$", re.M)
 _KEY_NAME = re.compile(r"[0-9a-f]{16}")
@@ -81,7 +82,45 @@ def kernel(function: F) -> F:
             compiled = numba.njit(cache=True, no_cfunc_wrapper=True)(function)
         finally:
             config.CACHE_DIR = before
+    _load_at_once(compiled._cache)
     return cast("F", compiled)
+
+
+def is_switched_off() -> bool:
+    """Tell whether NUMBA_DISABLE_JIT is set: kernels are then plain Python."""
+    return os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0")
+
+
+def _load_at_once(cache: Any) -> None:  # noqa: ANN401 - Numba has no types
+    """Have a function's cache load compiled code without Numba's registries first.
+
+    These say how to compile every function that Numba knows. Machine code needs none of them, unless it calls BLAS or
+    LAPACK, whose doors Numba opens as it fills them; and they take half of a cached start. Whatever does compile fills
+    them itself. Should a later Numba load in another way, it may.
+    """
+    parts = ("_guard_against_spurious_io_errors", "_cache_file", "_index_key", "_impl")
+    if not all(hasattr(cache, part) for part in parts):
+        return
+
+    def load_overload(signature: object, target_context: Any) -> object:  # noqa: ANN401
+        loaded = None  # to be compiled; also when the guard lets an error of the disk pass
+        with cache._guard_against_spurious_io_errors():
+            saved = cache._cache_file.load(cache._index_key(signature, target_context.codegen()))
+            if saved is not None:
+                if not _is_plain(saved):
+                    target_context.refresh()
+                loaded = cache._impl.rebuild(target_context, saved)
+        return loaded
+
+    cache.load_overload = load_overload
+
+
+def _is_plain(saved: Any) -> bool:  # noqa: ANN401
+    """Tell whether what Numba saved is machine code without linear algebra; False as well for what looks unknown."""
+    match saved:
+        case ((_, "object", (bytes(machine_code), _)), *_):
+            return not any(name in machine_code for name in _ALGEBRA)
+    return False
 
 
 @functools.cache
@@ -92,22 +131,8 @@ def _edited_since_start(module: str, source: Path) -> bool:
 
 @functools.cache
 def _numba() -> types.ModuleType:
-    """Import Numba and its functions of arrays, which ask at once whether SciPy has a BLAS.
-
-    To ask, they import scipy.linalg: a third of a second, for kernels of which none needs a BLAS. Where SciPy is
-    installed an empty module stands for it meanwhile; a kernel that calls np.dot imports the real one when it is
-    compiled.
-    """
-    numba = importlib.import_module("numba")  # here, so that only users of kernels wait for it
-    needless = _BLAS not in sys.modules and importlib.util.find_spec(_BLAS.partition(".")[0]) is not None
-    if needless:
-        sys.modules[_BLAS] = types.ModuleType(_BLAS)
-    try:
-        importlib.import_module("numba.np.arraymath")
-    finally:
-        if needless:
-            del sys.modules[_BLAS]
-    return numba
+    """Import Numba, here, so that only users of kernels wait for it."""
+    return importlib.import_module("numba")
 
 
 def is_cold(package: str) -> bool:
@@ -115,7 +140,7 @@ def is_cold(package: str) -> bool:
 
     Imports neither Numba nor the package, so that a command can say that its first run takes longer.
     """
-    if os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0"):
+    if is_switched_off():
         return False
     folders = kernel_folders(package)
     compiled = sum(next(folder.rglob("*.nbi"), None) is not None for folder in folders.values())

@@ -12,6 +12,7 @@ from hypothesis import strategies as some
 from planarm_sim.cpu import layout as at
 from planarm_sim.cpu.chip import Chip
 from planarm_sim.cpu.idle import LEAST_ROOM
+from planarm_sim.cpu.waiting import waiting_turns
 from sim_chip.avr_assembler import assemble
 
 SLICE = LEAST_ROOM // 2
@@ -140,3 +141,48 @@ def test_a_change_between_two_runs_is_seen():
     chip.run_to(200_000)
     assert chip.cycle < 100_010
     assert np.all(chip.registers[24] == 1)
+
+
+# --- Loops whose waiting shows in the flash (`cpu/waiting.py`) ---
+
+TURNS = {
+    "loop: rjmp loop": 2,
+    "loop: lds r24, 0x200\ncp r24, r25\nbrne loop": 5,
+    "loop: lds r24, 0x200\nlds r25, 0x201\ncp r24, r25\nbreq loop": 7,
+    "loop: lds r24, 0x200\nand r24, r16\nbreq loop": 5,
+    "loop: lds r24, 0x200\nand r24, r16\nbrcs loop": 5,  # the carry stays what it was
+    "loop: lds r24, 0x200\nlds r25, 0x201\ncp r24, r16\ncpc r25, r17\nbrne loop": 8,
+    "loop: lds r24, 0x84\ncp r24, r25\nbrne loop": 0,  # TCNT1L goes on by itself
+    "loop: lds r24, 0x200\nadc r24, r3\ncp r24, r4\nbrne loop": 0,  # adds what the last turn's CP carried
+    "loop: inc r20\nbrne loop": 0,
+    "loop: mov r1, r2\nmov r2, r3\nmov r3, r1\nrjmp loop": 0,
+    "loop: sts 0x200, r1\nrjmp loop": 0,
+    "loop: and r24, r16\nbrne loop": 0,
+    "loop: lds r24, 0x200\nsbrs r24, 1\nrjmp loop": 0,  # two ways through it
+}
+
+
+@pytest.mark.parametrize("source", TURNS)
+def test_a_loop_that_only_waits_is_found_with_the_length_of_its_turn(source):
+    code = Chip(assemble("nop\n" + source)).snapshot().program.code
+    found = waiting_turns(code)
+    assert list(found.values()) == ([TURNS[source]] if TURNS[source] else [])
+
+
+REGISTERS = some.integers(16, 19)
+OPERATIONS = some.sampled_from(["mov", "cp", "cpc", "add", "adc", "sub", "sbc", "and", "or", "eor"])
+STRAIGHT = some.one_of(
+    some.builds("{} r{}, r{}".format, OPERATIONS, REGISTERS, REGISTERS),
+    some.builds("lds r{}, {}".format, REGISTERS, some.sampled_from(["0x200", "0x201", "0x3E"])),
+    some.just("nop"),
+)
+JUMPS = some.sampled_from(["rjmp", "brne", "breq", "brcs", "brcc", "brmi"])
+
+
+@given(body=some.lists(STRAIGHT, max_size=6), jump=JUMPS, top=some.integers(60, 400))
+def test_of_random_straight_loops_none_is_passed_over_that_does_something(body, jump, top):
+    """The loop is entered in its middle, too; when it ends it begins again."""
+    half = len(body) // 2
+    lines = ["rjmp middle", "loop: nop", *body[:half], "middle: nop", *body[half:], f"{jump} loop", "rjmp loop"]
+    image = program("\n".join(lines), top)
+    assert run(image, 5000, 5000) == run(image, 5000, SLICE)

@@ -12,6 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as some
 
 from planarm_sim.cpu import layout as at
+from planarm_sim.cpu.bus import touch
 from planarm_sim.cpu.chip import Chip, FirstTouch, StopCause
 from planarm_sim.errors import DefectError, ImageError
 from sim_chip.avr_assembler import assemble
@@ -296,3 +297,8 @@ def test_queued_drives_and_frames_survive_a_reset():
     chip.run_to(4000)
     assert chip.pin_level(0) == 1
     assert chip.snapshot().state[0xC0] & 0x80
+
+
+def test_a_kernel_for_kernels_alone_refuses_python():
+    with pytest.raises(TypeError, match=r"planarm_sim\.cpu\.bus\.touch is for kernels; make it a @kernel"):
+        touch(np.zeros(1, np.int64), 0)

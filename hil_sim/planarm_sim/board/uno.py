@@ -12,28 +12,26 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
-import numpy as np
 from numpy.typing import NDArray
 
-from planarm_sim.board.pins import PINS, PinPlace, pin_place
+from planarm_sim.board.edge_log import EdgeLog, EdgeLogState
+from planarm_sim.board.inputs import AnalogInput, Pin
+from planarm_sim.board.pins import pin_place
 from planarm_sim.board.serial import CLOCK_HZ, FRAME_BITS, SerialPort, SerialState, Usb
-from planarm_sim.cpu.chip import EDGE_DTYPE, Chip, ResetCause, Snapshot, StopCause
+from planarm_sim.cpu.chip import Chip, ResetCause, Snapshot, StopCause
 from planarm_sim.cpu.layout import NEVER
 from planarm_sim.errors import LimitError, PinError, StoppedError, UsageError
 from planarm_sim.loader import Image, join_bootloader, load_elf, load_hex, load_image
 from planarm_sim.peripherals.adc import AREF
-from planarm_sim.trace import EDGE, VcdWriter
 from planarm_wire import messages
 
 if TYPE_CHECKING:
     from planarm_sim.debug import Target
     from planarm_sim.insight import Insight, Observer
 
-__all__ = ["CLOCK_HZ", "AnalogInput", "Pin", "Uno", "UnoSnapshot"]
+__all__ = ["CLOCK_HZ", "Pin", "Uno", "UnoSnapshot"]
 
 DEFAULT_BAUD = messages.BAUD
-_NO_EDGES = np.empty(0, EDGE_DTYPE)
-_PIN_INDICES = tuple(pin.index for pin in PINS)
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,62 +40,7 @@ class UnoSnapshot:
 
     chip: Snapshot
     serial: SerialState
-    edges: tuple[NDArray[Any], ...]
-    log_start_cycle: int
-    log_start_levels: tuple[int, ...]
-
-
-class Pin:
-    """One pin of the board, made by `Uno.pin`."""
-
-    def __init__(self, chip: Chip, place: PinPlace) -> None:
-        self._chip = chip
-        self._place = place
-
-    @property
-    def name(self) -> str:
-        """The name printed on the board."""
-        return self._place.name
-
-    @property
-    def level(self) -> int:
-        """The electrical level now, 0 or 1; a floating pin reads 0."""
-        return self._chip.pin_level(self._place.index)
-
-    def drive(self, level: int) -> None:
-        """Hold the pin at 0 or 1 from outside, from now on.
-
-        Raises:
-            PinError: another level.
-        """
-        if level not in (0, 1):
-            raise PinError(f"pin {self.name} cannot be driven to {level!r}; levels are 0 and 1")
-        self._chip.drive_pin(self._place.index, int(level))
-
-    def release(self) -> None:
-        """Let go of the pin."""
-        self._chip.drive_pin(self._place.index, None)
-
-
-class AnalogInput:
-    """An input of the analogue-to-digital converter, made by `Uno.analog`."""
-
-    def __init__(self, chip: Chip, channel: int) -> None:
-        self._chip = chip
-        self._channel = channel
-
-    @property
-    def volts(self) -> float | None:
-        """The voltage from outside, 0 to 5 V; None: nothing is connected, conversions see the digital level.
-
-        Raises:
-            PinError: set outside the limits.
-        """
-        return self._chip.analog_volts(self._channel)
-
-    @volts.setter
-    def volts(self, value: float | None) -> None:
-        self._chip.drive_analog(self._channel, value)
+    edges: EdgeLogState
 
 
 class Uno:
@@ -135,10 +78,7 @@ class Uno:
         self._symbols = image.symbols
         self._observer: Observer | None = None
         self.serial = SerialPort(self._chip, baud, usb)
-        self._edges: list[NDArray[Any]] = []
-        self._listeners: list[Callable[[NDArray[Any]], None]] = []
-        self._log_start_cycle = 0
-        self._log_start_levels = self._levels()
+        self._edges = EdgeLog(self._chip)
 
     @classmethod
     def from_hex(
@@ -320,16 +260,11 @@ class Uno:
         Raises:
             PinError: the board has no such pin.
         """
-        recorded = self._recorded()
-        chosen = recorded[recorded["pin"] == pin_place(name).index]
-        result = np.empty(len(chosen), EDGE)
-        result["cycle"], result["level"] = chosen["cycle"], chosen["level"]
-        return result
+        return self._edges.of(name)
 
     def clear_edges(self) -> None:
         """Forget the level changes recorded so far, of all pins."""
-        self._edges = []
-        self._log_start_cycle, self._log_start_levels = self.cycle, self._levels()
+        self._edges.clear()
 
     def take_edges(self) -> NDArray[Any]:
         """Return the level changes of all pins recorded so far and forget them; for runs without end.
@@ -337,15 +272,11 @@ class Uno:
         Returns:
             Structured array in order of time, fields cycle, pin (chip numbering, see `pins`) and level.
         """
-        if not self._edges:
-            return _NO_EDGES
-        taken = self._recorded()
-        self.clear_edges()
-        return taken
+        return self._edges.take()
 
     def listen(self, listener: Callable[[NDArray[Any]], None]) -> None:
         """Hand every further edge, after each run, to a function as well; see `take_edges` for their form."""
-        self._listeners.append(listener)
+        self._edges.listeners.append(listener)
 
     def write_vcd(self, path: str | Path, names: Sequence[str]) -> None:
         """Write the recorded level changes of some pins as a waveform file.
@@ -356,19 +287,7 @@ class Uno:
             PinError: the board has no such pin.
             TraceError: the file cannot be written.
         """
-        signal_of = {pin_place(name).index: number for number, name in enumerate(names)}
-        start = dict(zip(PINS, self._log_start_levels, strict=True))
-        levels = [start[pin_place(name)] for name in names]
-        edges, running = self._recorded(), self._interrupt_changes()
-        with VcdWriter(path, names, levels, self._log_start_cycle, ("isr",) if self.is_observed else ()) as vcd:
-            done = 0
-            for cycle, vector in running:
-                until = int(np.searchsorted(edges["cycle"], cycle, side="right"))
-                vcd.write(edges[done:until], signal_of)
-                vcd.number(cycle, 0, vector)
-                done = until
-            vcd.write(edges[done:], signal_of)
-            vcd.close(self.cycle)
+        self._edges.write_vcd(path, names, self._interrupt_changes() if self.is_observed else None)
 
     def _interrupt_changes(self) -> list[tuple[int, int]]:
         """Return when another interrupt, or none, began to run, and its number, since the recording's start."""
@@ -458,20 +377,13 @@ class Uno:
 
     def snapshot(self) -> UnoSnapshot:
         """Copy everything that decides the further run."""
-        return UnoSnapshot(
-            self._chip.snapshot(),
-            self.serial.snapshot(),
-            tuple(self._edges),
-            self._log_start_cycle,
-            self._log_start_levels,
-        )
+        return UnoSnapshot(self._chip.snapshot(), self.serial.snapshot(), self._edges.snapshot())
 
     def restore(self, snapshot: UnoSnapshot) -> None:
         """Go back to a snapshot of this board; with the same calls the same run follows."""
         self._chip.restore(snapshot.chip)
         self.serial.restore(snapshot.serial)
-        self._edges = list(snapshot.edges)
-        self._log_start_cycle, self._log_start_levels = snapshot.log_start_cycle, snapshot.log_start_levels
+        self._edges.restore(snapshot.edges)
         if self._observer is not None:
             self._observer.begin(self.cycle)
             self._chip.watch(self._observer)
@@ -490,7 +402,9 @@ class Uno:
 
     def _twin(self) -> Self:
         twin = copy.copy(self)
-        twin._chip, twin._edges, twin._observer = self._chip.fork(), list(self._edges), None
+        twin._chip, twin._observer = self._chip.fork(), None
+        twin._edges = EdgeLog(twin._chip)
+        twin._edges.restore(self._edges.snapshot())
         twin.serial = SerialPort(twin._chip, self.serial.baud, "direct" if self.serial.bridge is None else "16u2")
         twin.serial.restore(self.serial.snapshot())
         return twin
@@ -509,21 +423,8 @@ class Uno:
 
     def _collect(self) -> bool:
         sent = self.serial.collect()
-        edges = self._chip.drain_edges()
-        if len(edges):
-            self._edges.append(edges)
-            for listener in self._listeners:
-                listener(edges)
+        self._edges.collect()
         return sent
-
-    def _recorded(self) -> NDArray[Any]:
-        """All recorded edges in one array; joined once, then kept so."""
-        if len(self._edges) != 1:
-            self._edges = [np.concatenate([_NO_EDGES, *self._edges])]
-        return self._edges[0]
-
-    def _levels(self) -> tuple[int, ...]:
-        return tuple(self._chip.pin_level(index) for index in _PIN_INDICES)
 
 
 def _load_optional(path: str | Path | None) -> Image | None:

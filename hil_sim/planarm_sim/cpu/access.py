@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from planarm_sim.cpu.bus import IVSEL, read_data_space, touch, touch_outside, write_data_space
-from planarm_sim.cpu.compiled import constant, inlined, kernel  # kernel_cache: see there
+from planarm_sim.cpu.compiled import constant, inlined, inner  # kernel_cache: see there
 from planarm_sim.cpu.flags import I
 from planarm_sim.cpu.interrupts import ENTRY_CYCLES, WAKE_CYCLES, acknowledge
 from planarm_sim.cpu.layout import (
@@ -75,7 +75,7 @@ def note_turn(st: State) -> None:
     st[LOOK_AT] = 0
 
 
-@kernel
+@inner
 def look_early(st: State, cycle: int) -> None:
     """Have the CPU loop look for interrupts at `cycle` at the latest."""
     st[HORIZON] = min(st[HORIZON], cycle)
@@ -120,7 +120,7 @@ def access_data(st: State, memory: Bytes) -> None:
         restart_watchdog(st, int(st[CYCLE]))
 
 
-@kernel
+@inner
 def changed_bit(st: State, address: int, mask: int, level: bool) -> int:
     """Return what SBI or CBI writes: one bit alone, also of PINx and of registers whose ones clear flags.
 
@@ -133,7 +133,7 @@ def changed_bit(st: State, address: int, mask: int, level: bool) -> int:
     return before | mask if level else before & ~mask
 
 
-@kernel
+@inner
 def push_return(st: State, memory: Bytes, address: int) -> None:
     """Push a return address, low byte first; what falls outside the SRAM is lost and noted."""
     for shift in range(0, 16, 8):
@@ -145,7 +145,7 @@ def push_return(st: State, memory: Bytes, address: int) -> None:
         st[SP] = (place - 1) & 0xFFFF
 
 
-@kernel
+@inner
 def pop_return(st: State, memory: Bytes) -> int:
     """Pop a return address, high byte first; what lies outside the SRAM reads as 0 and is noted."""
     address = 0

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from planarm_sim.cpu.compiled import inlined, kernel  # kernel_cache: see there
+from planarm_sim.cpu.compiled import inlined, inner, kernel  # kernel_cache: see there
 from planarm_sim.cpu.interrupts import note_raised, pending_interrupts
 from planarm_sim.cpu.layout import (
     ACCESS_PC,
@@ -115,14 +115,14 @@ WRITABLE = np.full(256, 0xFF, dtype=np.int64)
 WRITABLE[[EIMSK, EICRA, PCICR, PCMSK1, SMCR, EEARH]] = (3, 15, 7, 0x7F, 15, 3)
 
 
-@kernel
+@inner
 def touch(st: State, address: int) -> None:
     """Note the first access to a register whose part is not modelled."""
     if st[TOUCHED + address] == 0:
         st[TOUCHED + address] = st[ACCESS_PC] + 1
 
 
-@kernel
+@inner
 def touch_outside(st: State, address: int) -> None:
     """Note the first access where there is no memory for it."""
     if st[OUTSIDE_ADDRESS] == 0:
@@ -152,6 +152,18 @@ def write_data_space(st: State, memory: Bytes, address: int, value: int) -> None
         memory[address - SRAM_START] = value
     else:
         touch_outside(st, address)
+
+
+@kernel
+def peek(st: State, memory: Bytes, address: int) -> int:
+    """As `read_data_space`, for Python."""
+    return int(read_data_space(st, memory, address))
+
+
+@kernel
+def poke(st: State, memory: Bytes, address: int, value: int) -> None:
+    """As `write_data_space`, for Python."""
+    write_data_space(st, memory, address, value)
 
 
 @inlined
@@ -212,7 +224,7 @@ def write_io(st: State, memory: Bytes, address: int, value: int) -> None:
         st[HORIZON] = SOMETHING_CHANGED
 
 
-@kernel
+@inner
 def write_cpu_register(st: State, address: int, value: int) -> None:
     """Write SPL, SPH or SREG."""
     if address == SREG:
@@ -223,7 +235,7 @@ def write_cpu_register(st: State, address: int, value: int) -> None:
         st[SP] = (st[SP] & 0x00FF) | (value << 8)
 
 
-@kernel
+@inner
 def write_rare_io(st: State, memory: Bytes, address: int, value: int, cycle: int) -> None:
     """Write a register whose effect the CPU loop must look at before its next instruction."""
     if TIFR0 <= address <= TIFR2:
@@ -250,7 +262,7 @@ def write_rare_io(st: State, memory: Bytes, address: int, value: int, cycle: int
         write_rarest_io(st, address, value, cycle)
 
 
-@kernel
+@inner
 def write_rarest_io(st: State, address: int, value: int, cycle: int) -> None:
     """Write one of the others, or a register of a part that is not modelled."""
     if address == MCUCR:
@@ -274,7 +286,7 @@ def write_rarest_io(st: State, address: int, value: int, cycle: int) -> None:
         st[address] = value
 
 
-@kernel
+@inner
 def write_mcu_control(st: State, value: int, cycle: int) -> None:
     """Write MCUCR: PUD at any time, IVSEL only within four cycles of IVCE (datasheet, 12.5)."""
     before = st[MCUCR]

@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 from planarm_sim.cpu import layout as at
 from planarm_sim.cpu import queues, service
 from planarm_sim.cpu import registers as reg
-from planarm_sim.cpu.bus import read_data_space, write_data_space
 from planarm_sim.cpu.decode import FLASH_BYTES
 from planarm_sim.cpu.dispatch import run
 from planarm_sim.cpu.interrupts import note_raised
@@ -32,6 +31,7 @@ from planarm_sim.cpu.values import (
     StopCause,
     Watcher,
 )
+from planarm_sim.cpu.views import ChipViews
 from planarm_sim.errors import DefectError, ImageError, PinError, UsageError
 from planarm_sim.peripherals.adc import NOT_DRIVEN, SUPPLY_UV
 from planarm_sim.peripherals.ports import drive_from_outside, refresh_port
@@ -70,7 +70,7 @@ _STOPS = {
 }
 
 
-class Chip:
+class Chip(ChipViews):
     """ATmega328P. Pins are numbered port * 8 + bit with B = 0, C = 1, D = 2 (PB1 is 1, PD1 is 17)."""
 
     def __init__(self, flash: bytes, *, boot_words: int = BOOT_WORDS[0], boot_reset: bool = False) -> None:
@@ -376,65 +376,6 @@ class Chip:
             outside = int(st[at.OUTSIDE_ADDRESS]) - 1
             touches.append(FirstTouch(outside, f"0x{outside:04X}", int(st[at.OUTSIDE_PC])))
         return tuple(touches)
-
-    # --- Views for tests and debuggers -----------------------------------------------------------------------------
-
-    @property
-    def pc(self) -> int:
-        """Word address of the next instruction."""
-        return int(self._state[at.PC])
-
-    @pc.setter
-    def pc(self, value: int) -> None:
-        self._state[at.PC] = value & 0x3FFF
-
-    @property
-    def sreg(self) -> int:
-        """Status register."""
-        return int(self._state[at.SREG_BITS])
-
-    @sreg.setter
-    def sreg(self, value: int) -> None:
-        self._state[at.SREG_BITS] = value & 0xFF
-
-    @property
-    def sp(self) -> int:
-        """Stack pointer."""
-        return int(self._state[at.SP])
-
-    @sp.setter
-    def sp(self, value: int) -> None:
-        self._state[at.SP] = value & 0xFFFF
-
-    @property
-    def registers(self) -> NDArray[np.int64]:
-        """The 32 general registers, a live view."""
-        return self._state[:32]
-
-    @property
-    def sram(self) -> NDArray[np.uint8]:
-        """The SRAM from data address 0x100 on, a live view."""
-        return self._sram
-
-    @property
-    def eeprom(self) -> NDArray[np.uint8]:
-        """The EEPROM, a live view."""
-        return self._eeprom
-
-    @property
-    def flash(self) -> NDArray[np.uint8]:
-        """The program memory; not to be written to."""
-        return self._program.flash
-
-    def peek_data(self, addresses: range) -> bytes:
-        """What the program would read at data addresses now, without what reading does to I/O registers."""
-        st = self._state.copy()
-        return bytes(read_data_space(st, self._memory, address) for address in addresses)
-
-    def poke_data(self, address: int, data: bytes) -> None:
-        """Write to the data space as the program does, with all that writing does, now."""
-        for place, byte in enumerate(data, start=address):
-            write_data_space(self._state, self._memory, place, byte)
 
     def poke_flash(self, address: int, data: bytes) -> None:
         """Replace bytes of the flash, as a programmer does."""

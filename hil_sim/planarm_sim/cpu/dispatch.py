@@ -12,16 +12,15 @@ import numpy as np
 
 from planarm_sim.cpu import access as io
 from planarm_sim.cpu import opcodes as op
-from planarm_sim.cpu.access import look_early, note_access, note_turn
+from planarm_sim.cpu.access import look_early, note_access
 from planarm_sim.cpu.compiled import kernel  # kernel_cache: see there
-from planarm_sim.cpu.flags import KEEP_IT, KEEP_ITH, KEEP_ITHC, C, H, I, N, S, T, V, Z, sign_flags
+from planarm_sim.cpu.flags import KEEP_IT, KEEP_ITH, KEEP_ITHC, C, I, S, V, Z, sign_flags
 from planarm_sim.cpu.layout import (
     CARRY_FLAGS,
     CHANGES,
     CYCLE,
     HORIZON,
     IRQ_EARLIEST,
-    LAST_BACK,
     LOOK_AT,
     PC,
     PENDING,
@@ -31,22 +30,32 @@ from planarm_sim.cpu.layout import (
     SP,
     SREG_BITS,
     STORES,
-    WATCHED,
     Bytes,
     State,
 )
-from planarm_sim.cpu.registers import READS_PLAIN, SRAM_END, SRAM_START
-from planarm_sim.cpu.service import AT_BAD_OPCODE, AT_BREAK, FLASH_WRITE, RUNNING, look_up
+from planarm_sim.cpu.memory import (
+    LOWEST_POP,
+    LOWEST_PUSH,
+    PC_BITS,
+    SRAM_BYTES,
+    Z_HIGH,
+    Z_LOW,
+    call,
+    go_back,
+    load,
+    moment,
+    pass_turns,
+    pop,
+    push,
+    store,
+)
+from planarm_sim.cpu.rare import KEEP_PRODUCT, do_rare
+from planarm_sim.cpu.registers import READS_PLAIN, SRAM_START
+from planarm_sim.cpu.service import RUNNING, look_up
 from planarm_sim.cpu.tables import WRITES_WORD
 
 PC_MASK = 0x3FFF
 FLASH_MASK = 0x7FFF
-SRAM_BYTES = SRAM_END - SRAM_START
-Z_LOW, Z_HIGH = 30, 31
-LOWEST_PUSH, LOWEST_POP = SRAM_START + 1, SRAM_START - 1
-"""SP from which on a return address lies in the SRAM entirely, when it is pushed and when it is popped."""
-KEEP_PRODUCT = I | T | H | S | V | N
-"""What a product leaves alone."""
 
 
 @kernel
@@ -61,6 +70,7 @@ def run(st: State, memory: Bytes, words: State, code: State, flash: Bytes, targe
     st[HORIZON] = SOMETHING_CHANGED  # whatever was done to the chip between two runs
     st[LOOK_AT] = 0
     st[CHANGES] += 1
+    turned = -1  # where and when a loop that only waits (see `waiting`) last turned
     while True:
         if cycle >= st[LOOK_AT]:
             st[PC] = pc
@@ -89,14 +99,7 @@ def run(st: State, memory: Bytes, words: State, code: State, flash: Bytes, targe
                 pc += 1
                 cycle += 2
             else:
-                address = st[SP]
-                st[SP] = (address - 1) & 0xFFFF
-                offset = address - SRAM_START
-                if 0 <= offset < SRAM_BYTES:
-                    memory[offset] = value
-                    st[STORES] += 1
-                else:
-                    note_access(st, io.WRITE, address, value, pc - 1)
+                push(st, memory, value, pc - 1)
             cycle += 1
         elif operation == op.POP2:
             offset = st[SP] - LOWEST_POP
@@ -107,14 +110,71 @@ def run(st: State, memory: Bytes, words: State, code: State, flash: Bytes, targe
                 pc += 1
                 cycle += 2
             else:
-                address = (st[SP] + 1) & 0xFFFF
-                st[SP] = address
-                offset = address - SRAM_START
-                if 0 <= offset < SRAM_BYTES:
-                    st[(word >> 8) & 0xFF] = memory[offset]
-                else:
-                    note_access(st, io.READ, address, (word >> 8) & 0xFF, pc - 1)
+                pop(st, memory, (word >> 8) & 0xFF, pc - 1)
             cycle += 1
+        elif operation == op.PUSH4:
+            offset = st[SP] - LOWEST_PUSH - 2
+            value = st[(word >> 8) & 0xFF]
+            if 0 <= offset < SRAM_BYTES - 3 and cycle + 5 < st[LOOK_AT]:
+                memory[offset + 3] = value
+                memory[offset + 2] = st[(word >> 16) & 0xFFFF]
+                memory[offset + 1] = st[(word >> 32) & 0xFF]
+                memory[offset] = st[(word >> 40) & 0xFF]
+                st[SP] -= 4
+                st[STORES] += 1
+                pc += 3
+                cycle += 6
+            else:
+                push(st, memory, value, pc - 1)
+            cycle += 1
+        elif operation == op.POP4:
+            offset = st[SP] - LOWEST_POP
+            if 0 <= offset < SRAM_BYTES - 3 and cycle + 5 < st[LOOK_AT]:
+                st[(word >> 8) & 0xFF] = memory[offset]
+                st[(word >> 16) & 0xFFFF] = memory[offset + 1]
+                st[(word >> 32) & 0xFF] = memory[offset + 2]
+                st[(word >> 40) & 0xFF] = memory[offset + 3]
+                st[SP] += 4
+                pc += 3
+                cycle += 6
+            else:
+                pop(st, memory, (word >> 8) & 0xFF, pc - 1)
+            cycle += 1
+        elif operation == op.ADD_ADC:
+            d = (word >> 8) & 0xFF
+            a = st[d]
+            b = st[(word >> 16) & 0xFFFF]
+            total = a + b
+            st[d] = total & 0xFF
+            flags = st[RESULT_FLAGS + (total & 0xFF)] ^ st[CARRY_FLAGS + ((a ^ b ^ total) & 0x1FF)]
+            if cycle < st[LOOK_AT]:
+                d = (word >> 32) & 0xFF
+                a = st[d]
+                b = st[(word >> 40) & 0xFFFF]
+                total = a + b + (flags & C)
+                st[d] = total & 0xFF
+                flags = st[RESULT_FLAGS + (total & 0xFF)] ^ st[CARRY_FLAGS + ((a ^ b ^ total) & 0x1FF)]
+                pc += 1
+                cycle += 1
+            sreg = (sreg & KEEP_IT) | flags
+        elif operation == op.SUB_SBC:
+            d = (word >> 8) & 0xFF
+            a = st[d]
+            b = st[(word >> 16) & 0xFFFF]
+            total = a - b
+            st[d] = total & 0xFF
+            flags = st[RESULT_FLAGS + (total & 0xFF)] ^ st[CARRY_FLAGS + ((a ^ b ^ total) & 0x1FF)]
+            if cycle < st[LOOK_AT]:
+                d = (word >> 32) & 0xFF
+                a = st[d]
+                b = st[(word >> 40) & 0xFFFF]
+                total = a - b - (flags & C)
+                st[d] = total & 0xFF
+                wide = st[RESULT_FLAGS + (total & 0xFF)] ^ st[CARRY_FLAGS + ((a ^ b ^ total) & 0x1FF)]
+                flags = wide & (flags | ~Z)
+                pc += 1
+                cycle += 1
+            sreg = (sreg & KEEP_IT) | flags
         elif operation == op.MOV2:
             st[(word >> 8) & 0xFF] = st[(word >> 16) & 0xFFFF]
             if cycle < st[LOOK_AT]:
@@ -137,14 +197,53 @@ def run(st: State, memory: Bytes, words: State, code: State, flash: Bytes, targe
             if cycle < st[LOOK_AT]:
                 pc += 1
                 cycle += 1
-                if ((sreg & (word >> 48) & 0xFF) != 0) == ((word >> 56) != 0):
+                if ((sreg & (word >> 48) & 0xFF) != 0) == ((word >> 56) & 1 != 0):
                     back = (word >> 32) & 0xFFFF < pc
                     pc = (word >> 32) & 0xFFFF
                     cycle += 1
-                    if back:
-                        st[LAST_BACK] = pc
-                        if pc == st[WATCHED]:
-                            note_turn(st)
+                    turn = word >> 57
+                    if turn:
+                        if turned + (turn << PC_BITS) == moment(pc, cycle):
+                            cycle = pass_turns(st, cycle, turn)
+                        turned = moment(pc, cycle)
+                    elif back:
+                        go_back(st, pc)
+
+        # --- How handlers begin and end: all five instructions, or the first -----------------------------------
+        elif operation == op.ENTER:
+            offset = st[SP] - LOWEST_PUSH - 1
+            if 0 <= offset < SRAM_BYTES - 2 and cycle + 6 < st[LOOK_AT]:
+                a = (word >> 8) & 0xFF
+                b = (word >> 16) & 0xFFFF
+                memory[offset + 2] = st[a]
+                memory[offset + 1] = st[b]
+                memory[offset] = sreg
+                st[b] = sreg
+                st[a] = 0
+                sreg = (sreg & KEEP_ITHC) | st[RESULT_FLAGS]
+                st[SP] -= 3
+                st[STORES] += 1
+                pc += 4
+                cycle += 6
+            else:
+                push(st, memory, st[(word >> 8) & 0xFF], pc - 1)
+            cycle += 1
+        elif operation == op.LEAVE:
+            offset = st[SP] - LOWEST_POP
+            b = (word >> 16) & 0xFFFF
+            if 0 <= offset < SRAM_BYTES - 4 and cycle + 6 < st[LOOK_AT] and memory[offset] & I == 0:
+                sreg = int(memory[offset]) | I
+                st[b] = memory[offset + 1]
+                st[(word >> 8) & 0xFF] = memory[offset + 2]
+                pc = ((int(memory[offset + 3]) << 8) | int(memory[offset + 4])) & PC_MASK
+                st[SP] += 5
+                cycle += 10
+                st[IRQ_EARLIEST] = cycle + 1
+                if st[PENDING] != 0:
+                    look_early(st, cycle + 1)
+            else:
+                pop(st, memory, b, pc - 1)
+                cycle += 1
 
         # --- What programs do most: arithmetic and logic -----------------------------------------------------
         elif operation == op.ADD:
@@ -282,11 +381,7 @@ def run(st: State, memory: Bytes, words: State, code: State, flash: Bytes, targe
             address = st[r] | (st[r + 1] << 8)
             st[r] = (address + 1) & 0xFF
             st[r + 1] = ((address + 1) >> 8) & 0xFF
-            offset = address - SRAM_START
-            if 0 <= offset < SRAM_BYTES:
-                st[(word >> 8) & 0xFF] = memory[offset]
-            else:
-                note_access(st, io.READ, address, (word >> 8) & 0xFF, pc - 1)
+            load(st, memory, address, (word >> 8) & 0xFF, pc - 1)
             cycle += 1
         elif operation == op.ST_INC:
             r = (word >> 16) & 0xFFFF
@@ -294,31 +389,14 @@ def run(st: State, memory: Bytes, words: State, code: State, flash: Bytes, targe
             value = st[(word >> 8) & 0xFF]
             st[r] = (address + 1) & 0xFF
             st[r + 1] = ((address + 1) >> 8) & 0xFF
-            offset = address - SRAM_START
-            if 0 <= offset < SRAM_BYTES:
-                memory[offset] = value
-                st[STORES] += 1
-            else:
-                note_access(st, io.WRITE, address, value, pc - 1)
+            store(st, memory, address, value, pc - 1)
             cycle += 1
         elif operation == op.LDS:
-            address = word >> 32
-            offset = address - SRAM_START
-            if 0 <= offset < SRAM_BYTES:
-                st[(word >> 8) & 0xFF] = memory[offset]
-            else:
-                note_access(st, io.READ, address, (word >> 8) & 0xFF, pc - 1)
+            load(st, memory, word >> 32, (word >> 8) & 0xFF, pc - 1)
             pc += 1
             cycle += 1
         elif operation == op.STS:
-            address = word >> 32
-            value = st[(word >> 8) & 0xFF]
-            offset = address - SRAM_START
-            if 0 <= offset < SRAM_BYTES:
-                memory[offset] = value
-                st[STORES] += 1
-            else:
-                note_access(st, io.WRITE, address, value, pc - 1)
+            store(st, memory, word >> 32, st[(word >> 8) & 0xFF], pc - 1)
             pc += 1
             cycle += 1
         elif operation == op.LDS_PLAIN:
@@ -330,24 +408,10 @@ def run(st: State, memory: Bytes, words: State, code: State, flash: Bytes, targe
             pc += 1
             cycle += 1
         elif operation == op.POP:
-            address = (st[SP] + 1) & 0xFFFF
-            st[SP] = address
-            offset = address - SRAM_START
-            if 0 <= offset < SRAM_BYTES:
-                st[(word >> 8) & 0xFF] = memory[offset]
-            else:
-                note_access(st, io.READ, address, (word >> 8) & 0xFF, pc - 1)
+            pop(st, memory, (word >> 8) & 0xFF, pc - 1)
             cycle += 1
         elif operation == op.PUSH:
-            address = st[SP]
-            st[SP] = (address - 1) & 0xFFFF
-            value = st[(word >> 8) & 0xFF]
-            offset = address - SRAM_START
-            if 0 <= offset < SRAM_BYTES:
-                memory[offset] = value
-                st[STORES] += 1
-            else:
-                note_access(st, io.WRITE, address, value, pc - 1)
+            push(st, memory, st[(word >> 8) & 0xFF], pc - 1)
             cycle += 1
 
         # --- Jumps, calls, branches and skips ----------------------------------------------------------------
@@ -363,53 +427,49 @@ def run(st: State, memory: Bytes, words: State, code: State, flash: Bytes, targe
             if sreg & (word >> 8) & 0xFF:
                 pc = word >> 32
                 cycle += 1
-                st[LAST_BACK] = pc
-                if pc == st[WATCHED]:
-                    note_turn(st)
+                turn = (word >> 16) & 0xFFFF
+                if turn:
+                    if turned + (turn << PC_BITS) == moment(pc, cycle):
+                        cycle = pass_turns(st, cycle, turn)
+                    turned = moment(pc, cycle)
+                else:
+                    go_back(st, pc)
         elif operation == op.BRBC_BACK:
             if sreg & (word >> 8) & 0xFF == 0:
                 pc = word >> 32
                 cycle += 1
-                st[LAST_BACK] = pc
-                if pc == st[WATCHED]:
-                    note_turn(st)
+                turn = (word >> 16) & 0xFFFF
+                if turn:
+                    if turned + (turn << PC_BITS) == moment(pc, cycle):
+                        cycle = pass_turns(st, cycle, turn)
+                    turned = moment(pc, cycle)
+                else:
+                    go_back(st, pc)
         elif operation == op.JUMP2:
             pc = word >> 32
             cycle += 1
         elif operation == op.JUMP2_BACK:
             pc = word >> 32
             cycle += 1
-            st[LAST_BACK] = pc
-            if pc == st[WATCHED]:
-                note_turn(st)
+            turn = (word >> 16) & 0xFFFF
+            if turn:
+                if turned + (turn << PC_BITS) == moment(pc, cycle):
+                    cycle = pass_turns(st, cycle, turn)
+                turned = moment(pc, cycle)
+            else:
+                go_back(st, pc)
         elif operation == op.JUMP3:
             back = word >> 32 < pc
             pc = word >> 32
             cycle += 2
             if back:
-                st[LAST_BACK] = pc
-                if pc == st[WATCHED]:
-                    note_turn(st)
+                go_back(st, pc)
         elif operation == op.RCALL:
-            place = st[SP] - LOWEST_PUSH
-            if 0 <= place < SRAM_BYTES - 1:
-                memory[place + 1] = pc & 0xFF
-                memory[place] = pc >> 8
-                st[SP] -= 2
-                st[STORES] += 1
-            else:
-                note_access(st, io.CALL, pc, pc, pc - 1)
+            call(st, memory, pc, pc)
             pc = word >> 32
             cycle += 2
         elif operation == op.CALL:
-            place = st[SP] - LOWEST_PUSH
-            if 0 <= place < SRAM_BYTES - 1:
-                memory[place + 1] = (pc + 1) & 0xFF
-                memory[place] = (pc + 1) >> 8
-                st[SP] -= 2
-                st[STORES] += 1
-            else:
-                note_access(st, io.CALL, pc, pc + 1, pc - 1)
+            call(st, memory, pc + 1, pc)
             pc = word >> 32
             cycle += 3
         elif operation == op.RET:
@@ -479,45 +539,17 @@ def run(st: State, memory: Bytes, words: State, code: State, flash: Bytes, targe
         elif operation == op.SBIS:
             note_access(st, io.SKIP_SET, (word >> 8) & 0xFF, ((word >> 16) & 0xFFFF) | (word >> 32 << 8), pc - 1)
 
-        # --- What programs do less ---------------------------------------------------------------------------
+        # --- What programs do less; what they do least is `rare`'s -------------------------------------------
         elif operation == op.COM:
             d = (word >> 8) & 0xFF
             result = st[d] ^ 0xFF
             st[d] = result
             sreg = (sreg & KEEP_ITH) | st[RESULT_FLAGS + (result & 0xFF)] | C
-        elif operation == op.NEG:
-            d = (word >> 8) & 0xFF
-            b = st[d]
-            total = -b
-            st[d] = total & 0xFF
-            sreg = (sreg & KEEP_IT) | (st[RESULT_FLAGS + (total & 0xFF)] ^ st[CARRY_FLAGS + ((b ^ total) & 0x1FF)])
-        elif operation == op.ASR:
-            d = (word >> 8) & 0xFF
-            a = st[d]
-            a |= (a & 0x80) << 1
-            st[d] = a >> 1
-            sreg = (sreg & KEEP_ITH) | st[SHIFT_FLAGS + (a & 0x1FF)]
         elif operation == op.MUL:
             product = st[(word >> 8) & 0xFF] * st[(word >> 16) & 0xFFFF]
             st[0] = product & 0xFF
             st[1] = product >> 8
             sreg = (sreg & KEEP_PRODUCT) | (product >> 15) | (Z if product == 0 else 0)
-            cycle += 1
-        elif operation == op.MULX:
-            a = st[(word >> 8) & 0xFF]
-            b = st[(word >> 16) & 0xFFFF]
-            kind = word >> 32
-            if kind & op.D_SIGNED:
-                a = (a ^ 0x80) - 0x80
-            if kind & op.R_SIGNED:
-                b = (b ^ 0x80) - 0x80
-            product = (a * b) & 0xFFFF
-            carry = product >> 15
-            if kind & op.FRACTIONAL:
-                product = (product << 1) & 0xFFFF
-            st[0] = product & 0xFF
-            st[1] = product >> 8
-            sreg = (sreg & KEEP_PRODUCT) | carry | (Z if product == 0 else 0)
             cycle += 1
         elif operation == op.LPM:
             st[(word >> 8) & 0xFF] = flash[(st[Z_LOW] | (st[Z_HIGH] << 8)) & FLASH_MASK]
@@ -528,71 +560,15 @@ def run(st: State, memory: Bytes, words: State, code: State, flash: Bytes, targe
             st[Z_HIGH] = ((address + 1) >> 8) & 0xFF
             st[(word >> 8) & 0xFF] = flash[address & FLASH_MASK]
             cycle += 2
-        elif operation == op.LD_DEC:
-            r = (word >> 16) & 0xFFFF
-            address = ((st[r] | (st[r + 1] << 8)) - 1) & 0xFFFF
-            st[r] = address & 0xFF
-            st[r + 1] = address >> 8
-            offset = address - SRAM_START
-            if 0 <= offset < SRAM_BYTES:
-                st[(word >> 8) & 0xFF] = memory[offset]
-            else:
-                note_access(st, io.READ, address, (word >> 8) & 0xFF, pc - 1)
-            cycle += 1
-        elif operation == op.ST_DEC:
-            r = (word >> 16) & 0xFFFF
-            address = ((st[r] | (st[r + 1] << 8)) - 1) & 0xFFFF
-            value = st[(word >> 8) & 0xFF]
-            st[r] = address & 0xFF
-            st[r + 1] = address >> 8
-            offset = address - SRAM_START
-            if 0 <= offset < SRAM_BYTES:
-                memory[offset] = value
-                st[STORES] += 1
-            else:
-                note_access(st, io.WRITE, address, value, pc - 1)
-            cycle += 1
-        elif operation == op.BLD:
-            d = (word >> 8) & 0xFF
-            r = (word >> 16) & 0xFFFF
-            st[d] = (st[d] | r) if sreg & T else (st[d] & ~r)
-        elif operation == op.BST:
-            sreg = (sreg | T) if st[(word >> 8) & 0xFF] & (word >> 16) & 0xFFFF else (sreg & ~T)
-        elif operation == op.IJMP:
-            pc = (st[Z_LOW] | (st[Z_HIGH] << 8)) & PC_MASK
-            cycle += 1
-        elif operation == op.ICALL:
-            place = st[SP] - LOWEST_PUSH
-            if 0 <= place < SRAM_BYTES - 1:
-                memory[place + 1] = pc & 0xFF
-                memory[place] = pc >> 8
-                st[SP] -= 2
-                st[STORES] += 1
-            else:
-                note_access(st, io.CALL, pc, pc, pc - 1)
-            pc = (st[Z_LOW] | (st[Z_HIGH] << 8)) & PC_MASK
-            cycle += 2
-
-        # --- The chip itself ---------------------------------------------------------------------------------
         elif operation == op.NOP:
             pass
-        elif operation == op.WRAP:
-            pc = (pc - 1) & PC_MASK
-            cycle -= 1
-        elif operation == op.SLEEP:
-            note_access(st, io.SLEEP, pc, pc, pc - 1)
-        elif operation == op.WDR:
-            note_access(st, io.RESTART_WATCHDOG, pc, pc, pc - 1)
         else:
-            cause = AT_BAD_OPCODE
-            if operation == op.BREAK:
-                cause = AT_BREAK
-            else:
-                pc -= 1
-                cycle -= 1
-                if operation == op.SPM:
-                    cause = FLASH_WRITE
             st[PC] = pc
             st[CYCLE] = cycle
             st[SREG_BITS] = sreg
-            return cause
+            cause = do_rare(st, memory, word)
+            if cause != RUNNING:
+                return cause
+            pc = int(st[PC])
+            cycle = int(st[CYCLE])
+            sreg = int(st[SREG_BITS])

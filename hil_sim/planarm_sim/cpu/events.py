@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from planarm_sim.cpu.compiled import inlined, kernel  # kernel_cache: see there
+from planarm_sim.cpu.compiled import inlined, inner  # kernel_cache: see there
 from planarm_sim.cpu.interrupts import note_raised, pending_interrupts
 from planarm_sim.cpu.layout import (
     BROKEN,
@@ -104,7 +104,7 @@ def happen(st: State, memory: Bytes, source: int, cycle: int) -> None:
         advance_adc(st, cycle)
 
 
-@kernel
+@inner
 def next_outside_drive(st: State, cycle: int) -> None:
     """Apply the oldest queued outside drive: cycle << 8 | pin << 2 | kind."""
     entry = st[st[IN_BASE] + st[IN_HEAD]]

@@ -6,7 +6,7 @@ instruction decides; the caller keeps the others.
 
 from __future__ import annotations
 
-from planarm_sim.cpu.compiled import kernel  # kernel_cache: see there
+from planarm_sim.cpu.compiled import inner  # kernel_cache: see there
 
 C, Z, N, V, S, H, T, I = (1 << bit for bit in range(8))  # noqa: E741 - the manual's names
 KEEP_IT = I | T
@@ -15,7 +15,7 @@ KEEP_ITH = I | T | H
 KEEP_ITHC = I | T | H | C
 
 
-@kernel
+@inner
 def sign_flags(result: int, overflow: int) -> int:
     """Z, N, V and S of an 8-bit result; `overflow` is V as 0 or 1."""
     negative = result >> 7

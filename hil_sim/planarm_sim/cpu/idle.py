@@ -13,7 +13,7 @@ comparisons before longer and longer rests.
 
 from __future__ import annotations
 
-from planarm_sim.cpu.compiled import inlined, kernel  # kernel_cache: see there
+from planarm_sim.cpu.compiled import inlined, inner  # kernel_cache: see there
 from planarm_sim.cpu.layout import (
     CHANGES,
     CYCLE,
@@ -64,7 +64,7 @@ def choose_loop(st: State) -> None:
     st[WATCH_SAW] = 0
 
 
-@kernel
+@inner
 def pass_over(st: State, words: State) -> None:
     """At the head of the watched loop: move CYCLE on by whole turns if the program only waits there.
 
@@ -136,7 +136,7 @@ def same_contents(st: State, words: State) -> bool:
     return bool(different == 0)
 
 
-@kernel
+@inner
 def give_up(st: State) -> None:
     """Watch nothing for a while, each time twice as long."""
     st[WATCH_PENALTY] = min(2 * st[WATCH_PENALTY] + 1, LONGEST_REST)

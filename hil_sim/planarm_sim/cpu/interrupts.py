@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from planarm_sim.cpu.compiled import inlined, kernel  # kernel_cache: see there
+from planarm_sim.cpu.compiled import inlined, inner, kernel  # kernel_cache: see there
 from planarm_sim.cpu.layout import LEVEL, RAISED_AT, State
 from planarm_sim.cpu.registers import (
     ADCSRA,
@@ -44,7 +44,7 @@ SPM_READY = 25
 ENTRY_CYCLES, WAKE_CYCLES = 4, 4
 
 
-@kernel
+@inner
 def pending_interrupts(st: State) -> int:
     """Bit n is set when vector n has its flag and its enable; the lowest bit is the first in priority."""
     pending = (st[EIFR] & st[EIMSK]) << INT0
@@ -84,7 +84,7 @@ def note_raised(st: State, before: int, cycle: int) -> None:
         raised &= raised - 1
 
 
-@kernel
+@inner
 def low_levels(st: State) -> int:
     """INT0 (bit 0) and INT1 (bit 1) that are enabled, set to low level, and low."""
     sense = st[EICRA]
@@ -131,7 +131,7 @@ def acknowledge(st: State, vector: int) -> bool:
     return INT1 < vector <= TIMER0_OVF or vector in (USART_TX, ADC_COMPLETE)
 
 
-@kernel
+@inner
 def timer_flag(index: int) -> int:
     """TIFRn bit of the index-th of COMPA, COMPB, OVF."""
     return TOV if index == 2 else OCF_A << index

@@ -17,8 +17,8 @@ from __future__ import annotations
     COM, NEG, ASR, MUL, MULX, LPM, LPM_INC, LD_DEC, ST_DEC, BLD, BST, IJMP, ICALL,
     NOP, WRAP, SLEEP, WDR,
     BREAK, SPM,
-    PUSH2, POP2, MOV2, LDS2, COMPARE_BRANCH,
-) = range(77)
+    PUSH2, POP2, PUSH4, POP4, MOV2, LDS2, ADD_ADC, SUB_SBC, COMPARE_BRANCH, ENTER, LEAVE,
+) = range(83)
 # fmt: on
 
 D_SIGNED, R_SIGNED, FRACTIONAL = 1, 2, 4

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from planarm_sim.cpu.access import LAST_READ, NOTHING, TURN, access_data, take_interrupt
-from planarm_sim.cpu.compiled import inlined, kernel  # kernel_cache: see there
+from planarm_sim.cpu.compiled import inlined, inner, kernel  # kernel_cache: see there
 from planarm_sim.cpu.events import next_event, process_events
 from planarm_sim.cpu.flags import I
 from planarm_sim.cpu.idle import choose_loop, pass_over
@@ -36,7 +36,7 @@ REACHED, AT_BREAK, AT_BAD_OPCODE, ASLEEP_FOR_EVER, LOG_FULL, RESET_WANTED, FLASH
 FIRST_STOP = REACHED
 
 
-@kernel
+@inner
 def look_up(st: State, memory: Bytes, words: State, target: int) -> int:
     """All that happens between the instruction that has ended at CYCLE and the next one at PC.
 
@@ -52,10 +52,11 @@ def look_up(st: State, memory: Bytes, words: State, target: int) -> int:
             process_events(st, memory, until)
         access_data(st, memory)
     if st[CYCLE] >= st[HORIZON]:
-        cause = service(st, memory, target)
-        while RUNNING < cause < FIRST_STOP:
-            take_interrupt(st, memory, cause)
+        while True:
             cause = service(st, memory, target)
+            if not RUNNING < cause < FIRST_STOP:
+                break
+            take_interrupt(st, memory, cause)
         if cause != RUNNING:
             return int(cause)
         choose_loop(st)

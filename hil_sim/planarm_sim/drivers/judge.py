@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from planarm_sim.cpu.compiled import kernel  # kernel_cache: see there
+from planarm_sim.cpu.compiled import inner, kernel  # kernel_cache: see there
 
 Ints = NDArray[np.int64]
 Floats = NDArray[np.float64]
@@ -111,7 +111,7 @@ def judge_edges(
     return made, broken
 
 
-@kernel
+@inner
 def settle(s: Ints, limit: Floats, d: int, now: int, events: Ints, made: int) -> int:
     """Take the pending step when its pulse is long enough by now."""
     if not s[PENDING]:
@@ -127,7 +127,7 @@ def settle(s: Ints, limit: Floats, d: int, now: int, events: Ints, made: int) ->
     return emit(s, d, due, events, made)
 
 
-@kernel
+@inner
 def next_phase(phase: int, size: int, forward: bool) -> int:
     """Return the neighbouring position of a resolution; off its positions, the next one on the way."""
     off = phase % size
@@ -136,7 +136,7 @@ def next_phase(phase: int, size: int, forward: bool) -> int:
     return phase - (size if off == 0 else off)
 
 
-@kernel
+@inner
 def emit(s: Ints, d: int, cycle: int, events: Ints, made: int) -> int:
     """Write an event: the driver's phase, and whether current flows."""
     events[made, 0], events[made, 1], events[made, 2] = cycle, d, s[PHASE]
@@ -144,7 +144,7 @@ def emit(s: Ints, d: int, cycle: int, events: Ints, made: int) -> int:
     return made + 1
 
 
-@kernel
+@inner
 def on_rise(s: Ints, limit: Floats, d: int, cycle: int, violations: Floats, broken: int) -> int:
     """A pulse begins: it becomes pending unless a rule makes it void."""
     s[STEP] = 1
@@ -174,7 +174,7 @@ def on_rise(s: Ints, limit: Floats, d: int, cycle: int, violations: Floats, brok
     return broken
 
 
-@kernel
+@inner
 def on_fall(s: Ints, limit: Floats, d: int, cycle: int, violations: Floats, broken: int) -> int:
     """A pulse ends: too soon, and it was none."""
     s[STEP] = 0
@@ -186,7 +186,7 @@ def on_fall(s: Ints, limit: Floats, d: int, cycle: int, violations: Floats, brok
     return broken
 
 
-@kernel
+@inner
 def on_dir(s: Ints, limit: Floats, d: int, cycle: int, level: int, violations: Floats, broken: int) -> int:
     """DIR changes: within the hold time after a rise, the step goes the new way."""
     if s[DIR] == level:
@@ -200,7 +200,7 @@ def on_dir(s: Ints, limit: Floats, d: int, cycle: int, level: int, violations: F
     return broken
 
 
-@kernel
+@inner
 def on_enable(s: Ints, d: int, cycle: int, enabled: bool, events: Ints, made: int) -> int:
     """ENABLE changes: current flows, or not."""
     if enabled and not s[ENABLED]:
@@ -209,7 +209,7 @@ def on_enable(s: Ints, d: int, cycle: int, enabled: bool, events: Ints, made: in
     return emit(s, d, cycle, events, made)
 
 
-@kernel
+@inner
 def on_awake(s: Ints, limit: Floats, d: int, cycle: int, awake: int, events: Ints, made: int) -> int:
     """SLEEP is released or pulled: asleep no current flows, and the charge pump must start anew afterwards."""
     if awake and not s[AWAKE]:
@@ -218,7 +218,7 @@ def on_awake(s: Ints, limit: Floats, d: int, cycle: int, awake: int, events: Int
     return emit(s, d, cycle, events, made)
 
 
-@kernel
+@inner
 def on_mode(s: Ints, sizes: Ints, bit: int, level: int, cycle: int) -> None:
     """A micro-step pin changes: the size of the steps to come."""
     bits = s[MODE_BITS] & ~(1 << bit) | level << bit
@@ -240,7 +240,7 @@ def set_power(s: Ints, limit: Floats, d: int, cycle: int, powered: bool, events:
     return emit(s, d, cycle, events, made)
 
 
-@kernel
+@inner
 def violate(violations: Floats, broken: int, d: int, cycle: int, rule: int, measured: float) -> int:
     """Write a broken rule."""
     violations[broken, 0], violations[broken, 1], violations[broken, 2] = cycle, d, rule

@@ -8,7 +8,7 @@ chip goes on. What is noted stands in four arrays; their fields are named below.
 
 from __future__ import annotations
 
-from planarm_sim.cpu.compiled import kernel  # kernel_cache: see there
+from planarm_sim.cpu.compiled import inner, kernel  # kernel_cache: see there
 from planarm_sim.cpu.dispatch import run
 from planarm_sim.cpu.interrupts import ENTRY_CYCLES, WAKE_CYCLES
 from planarm_sim.cpu.layout import (
@@ -88,7 +88,7 @@ INTERVAL_WORDS = 5
 LOG_MARGIN = FRAMES
 
 
-@kernel
+@inner
 def bin_of(value: int) -> int:
     """Bin of a number of cycles."""
     if value < FINE_BINS:
@@ -189,7 +189,7 @@ def data_byte(st: State, memory: Bytes, address: int) -> int:
     return int(st[address])
 
 
-@kernel
+@inner
 def arrive(st: State, role: int, totals: State, frames: State, functions: State, vectors: State, log: State) -> None:
     """A landmark is reached; its instruction comes next."""
     sp = int(st[SP])
@@ -209,7 +209,7 @@ def arrive(st: State, role: int, totals: State, frames: State, functions: State,
         begin_function(st, role >> 8, totals, frames, functions)
 
 
-@kernel
+@inner
 def leave(st: State, role: int, totals: State, frames: State, functions: State, vectors: State, log: State) -> None:
     """The instruction at a landmark has run."""
     sp = int(st[SP])
@@ -221,7 +221,7 @@ def leave(st: State, role: int, totals: State, frames: State, functions: State, 
         totals[ASLEEP_SINCE] = st[CYCLE]
 
 
-@kernel
+@inner
 def push_frame(st: State, function: int, vector: int, totals: State, frames: State) -> int:
     """Make a frame; returns where it is, or -1 when there is no room."""
     if totals[DEPTH] >= FRAMES:
@@ -238,14 +238,14 @@ def push_frame(st: State, function: int, vector: int, totals: State, frames: Sta
     return at
 
 
-@kernel
+@inner
 def begin_function(st: State, function: int, totals: State, frames: State, functions: State) -> None:
     """A function is called."""
     if push_frame(st, function, 0, totals, frames) >= 0:
         functions[FUNCTION_WORDS * function + CALLS] += 1
 
 
-@kernel
+@inner
 def begin_interrupt(st: State, totals: State, frames: State, vectors: State) -> None:
     """An interrupt is taken: its first instruction, in the vector table, comes next."""
     now = int(st[CYCLE])
@@ -280,7 +280,7 @@ def end_frames(now: int, sp: int, totals: State, frames: State, functions: State
             end_function(now, totals, frames, functions)
 
 
-@kernel
+@inner
 def end_function(now: int, totals: State, frames: State, functions: State) -> None:
     """The function on top has returned."""
     totals[DEPTH] -= 1
@@ -294,7 +294,7 @@ def end_function(now: int, totals: State, frames: State, functions: State) -> No
     frames[at - FRAME_WORDS + FRAME_AWAY] += frames[at + FRAME_AWAY]
 
 
-@kernel
+@inner
 def is_within_itself(at: int, frames: State) -> bool:
     """Tell whether the function of the frame `at` was called by itself; then its first call counts for all."""
     below = at - FRAME_WORDS
@@ -305,7 +305,7 @@ def is_within_itself(at: int, frames: State) -> bool:
     return False
 
 
-@kernel
+@inner
 def end_interrupt(now: int, totals: State, frames: State, vectors: State, log: State) -> None:
     """The interrupt on top has returned."""
     totals[DEPTH] -= 1
@@ -329,7 +329,7 @@ def end_interrupt(now: int, totals: State, frames: State, vectors: State, log: S
     totals[LOGGED] += 1
 
 
-@kernel
+@inner
 def add_value(vectors: State, at: int, bins: int, value: int) -> None:
     """Add to sum, least, most and histogram."""
     vectors[at] += value

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from planarm_sim.cpu.compiled import kernel  # kernel_cache: see there
+from planarm_sim.cpu.compiled import inner  # kernel_cache: see there
 from planarm_sim.cpu.layout import (
     ADC_FIRST,
     ADC_INPUT,
@@ -53,13 +53,13 @@ SYNCHRONISATION_CYCLES = 3
 FULL_SCALE = 1023
 
 
-@kernel
+@inner
 def adc_clock(st: State) -> int:
     """CPU cycles in a cycle of the ADC's clock (table 24-5)."""
     return 1 << max(int(st[ADCSRA] & ADPS), 1)
 
 
-@kernel
+@inner
 def read_adc(st: State, address: int) -> int:
     """Read ADCL, which holds the result until ADCH is read, or ADCH (24.2)."""
     result = st[ADC_RESULT] << 6 if st[ADMUX] & ADLAR else st[ADC_RESULT]
@@ -67,7 +67,7 @@ def read_adc(st: State, address: int) -> int:
     return int(result & 0xFF if address == ADCL else result >> 8)
 
 
-@kernel
+@inner
 def write_adc(st: State, address: int, value: int, cycle: int) -> None:
     """Write ADCSRA, ADCSRB or ADMUX; the data registers cannot be written."""
     if address == ADMUX:
@@ -86,7 +86,7 @@ def write_adc(st: State, address: int, value: int, cycle: int) -> None:
         trigger(st, cycle)
 
 
-@kernel
+@inner
 def trigger_signal(st: State) -> bool:
     """Level of the chosen source; none of its own while running free."""
     source = st[ADCSRB] & ADTS
@@ -95,7 +95,7 @@ def trigger_signal(st: State) -> bool:
     return bool((st[TIFR0] & TRIGGERS_0[source]) | (st[TIFR1] & TRIGGERS_1[source]) != 0)
 
 
-@kernel
+@inner
 def trigger(st: State, cycle: int) -> None:
     """The chosen source's flag has risen: reset the prescaler and start, unless a conversion is under way (24.3)."""
     if st[ADCSRA] & ADEN and st[ADCSRA] & ADATE and st[ADC_PHASE] == IDLE:
@@ -107,7 +107,7 @@ def trigger(st: State, cycle: int) -> None:
         st[HORIZON] = min(st[HORIZON], st[DUE_ADC])
 
 
-@kernel
+@inner
 def write_control(st: State, value: int, cycle: int) -> None:
     """Write ADCSRA: switch on and off, start, clear the flag."""
     before = st[ADCSRA]
@@ -128,7 +128,7 @@ def write_control(st: State, value: int, cycle: int) -> None:
         st[DUE_ADC] = st[ADC_ORIGIN] + ((cycle - st[ADC_ORIGIN]) // clock + 1) * clock
 
 
-@kernel
+@inner
 def advance_adc(st: State, cycle: int) -> None:
     """The next step of a conversion: 1.5 ADC clocks to the sample, 13 in all (table 24-1).
 
@@ -156,7 +156,7 @@ def advance_adc(st: State, cycle: int) -> None:
             st[DUE_ADC] = NEVER
 
 
-@kernel
+@inner
 def start_conversion(st: State, cycle: int) -> None:
     """Fix channel and reference, and wait for the sample."""
     st[ADC_START] = cycle
@@ -166,7 +166,7 @@ def start_conversion(st: State, cycle: int) -> None:
     st[DUE_ADC] = cycle + halves * adc_clock(st) // 2
 
 
-@kernel
+@inner
 def convert(st: State) -> int:
     """Result for the voltages of now: V * 1024 / Vref (24.7)."""
     source = st[ADC_MUX] >> 6
@@ -177,7 +177,7 @@ def convert(st: State) -> int:
     return int(voltage * 1024 // reference)
 
 
-@kernel
+@inner
 def input_uv(st: State, channel: int) -> int:
     """Microvolts on a channel (table 24-4); reserved ones read as ground."""
     if channel < CHANNELS:

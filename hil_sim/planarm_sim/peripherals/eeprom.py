@@ -6,7 +6,7 @@ and the start of a write for two; erase and write takes 3.4 ms, each alone 1.8 m
 
 from __future__ import annotations
 
-from planarm_sim.cpu.compiled import kernel  # kernel_cache: see there
+from planarm_sim.cpu.compiled import inner  # kernel_cache: see there
 from planarm_sim.cpu.layout import (
     CYCLE,
     DUE_EEPROM,
@@ -30,13 +30,13 @@ READ_HALT, WRITE_HALT = 4, 2
 WINDOW_CYCLES = 4
 
 
-@kernel
+@inner
 def read_control(st: State, cycle: int) -> int:
     """Read EECR; EEMPE reads one while its window is open."""
     return int(st[EECR] | (EEMPE if cycle < st[EE_WRITE_UNTIL] else 0))
 
 
-@kernel
+@inner
 def write_control(st: State, memory: Bytes, value: int, cycle: int) -> None:
     """Write EECR: read a byte, start a write, open the window."""
     busy = st[EECR] & EEPE
@@ -60,7 +60,7 @@ def write_control(st: State, memory: Bytes, value: int, cycle: int) -> None:
         st[CYCLE] += READ_HALT
 
 
-@kernel
+@inner
 def finish_write(st: State, memory: Bytes) -> None:
     """The programming time is over: the byte is there, and EEPE reads zero."""
     address = st[EE_BUSY_ADDRESS]

@@ -6,7 +6,7 @@ A change of a pin acts PIPE_DELAY = 3 cycles later: latch, two synchroniser stag
 
 from __future__ import annotations
 
-from planarm_sim.cpu.compiled import kernel  # kernel_cache: see there
+from planarm_sim.cpu.compiled import inner  # kernel_cache: see there
 from planarm_sim.cpu.layout import (
     DUE_CAPTURE,
     DUE_PIPE,
@@ -29,7 +29,7 @@ from planarm_sim.peripherals.ports import EFFECT_CLOCK0, EFFECT_CLOCK1, EFFECT_I
 from planarm_sim.peripherals.timers import ICF, advance_timer, clock_timer, plan_timer
 
 
-@kernel
+@inner
 def deliver_inputs(st: State, cycle: int) -> None:
     """Take the oldest entry out of the input pipeline and act on it."""
     slot = PIPE + 2 * st[PIPE_HEAD]
@@ -47,14 +47,14 @@ def deliver_inputs(st: State, cycle: int) -> None:
         clock_from_pin(st, TIMER1, cycle)
 
 
-@kernel
+@inner
 def clock_from_pin(st: State, t: int, cycle: int) -> None:
     """One clock of a timer that counts edges of its T pin."""
     clock_timer(st, t, cycle)
     st[t + F_SYNC] = cycle
 
 
-@kernel
+@inner
 def capture(st: State, cycle: int) -> None:
     """Copy TCNT1 to ICR1 and set ICF1 (datasheet, 16.6.1)."""
     st[DUE_CAPTURE] = NEVER

@@ -7,7 +7,7 @@ seen by an IN only with one instruction between them).
 
 from __future__ import annotations
 
-from planarm_sim.cpu.compiled import constant, inlined, kernel  # kernel_cache: see there
+from planarm_sim.cpu.compiled import constant, inlined, inner, kernel  # kernel_cache: see there
 from planarm_sim.cpu.layout import (
     CHANGED_AT,
     CHANGES,
@@ -57,7 +57,7 @@ CAPTURE_PIN, CLOCK0_PIN, CLOCK1_PIN = 1 << 0, 1 << 4, 1 << 5  # PB0, PD4, PD5
 INT0_PIN = 1 << 2  # PD2; INT1 is PD3
 
 
-@kernel
+@inner
 def log_edge(st: State, cycle: int, pin: int, level: int) -> None:
     """Log an edge that the chip made, by driving or pulling up; stop the CPU loop when the log is nearly full."""
     count = st[EDGE_COUNT]
@@ -96,7 +96,7 @@ def refresh_port(st: State, port: int, cycle: int) -> None:
     st[DIRECTION + port] = direction
 
 
-@kernel
+@inner
 def notify_inputs(st: State, port: int, changed: int, level: int, cycle: int) -> None:
     """Send what a change of levels means to peripherals into the input pipeline."""
     effects = 0
@@ -124,7 +124,7 @@ def notify_inputs(st: State, port: int, changed: int, level: int, cycle: int) ->
             st[HORIZON] = min(st[HORIZON], cycle + PIPE_DELAY)
 
 
-@kernel
+@inner
 def edge_effect(sense: int, level: int, effect: int) -> int:
     """Effect of a change of INT0 or INT1 under its ISCn1:0 bits (datasheet, table 13-1)."""
     if sense == 0:
@@ -134,13 +134,13 @@ def edge_effect(sense: int, level: int, effect: int) -> int:
     return 0
 
 
-@kernel
+@inner
 def clocks(shift: int, level: int) -> bool:
     """Tell whether a timer on an external clock counts this edge."""
     return shift == CLOCK_RISING if level else shift == CLOCK_FALLING
 
 
-@kernel
+@inner
 def schedule_capture(st: State, level: int, cycle: int) -> None:
     """An edge of ICP1: capture after the synchroniser and, when on, the noise canceller."""
     wanted = (level != 0) == (st[TCCR1B] & ICES1 != 0)
@@ -174,7 +174,7 @@ def write_port(st: State, address: int, value: int, cycle: int) -> None:
     refresh_port(st, port, cycle)
 
 
-@kernel
+@inner
 def set_override(st: State, pin: int, connected: bool, level: bool, cycle: int) -> None:
     """Connect a peripheral's output to a pin in place of PORTx, or disconnect it."""
     port = pin >> 3

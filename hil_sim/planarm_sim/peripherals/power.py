@@ -7,7 +7,7 @@ are not blocked here; the datasheet does not say what they give.
 
 from __future__ import annotations
 
-from planarm_sim.cpu.compiled import kernel  # kernel_cache: see there
+from planarm_sim.cpu.compiled import inner  # kernel_cache: see there
 from planarm_sim.cpu.layout import (
     ADC_PHASE,
     CLOCK_STOPPED,
@@ -56,7 +56,7 @@ PRTWI, PRTIM2, PRTIM0, PRTIM1, PRSPI, PRUSART0, PRADC = 1 << 7, 1 << 6, 1 << 5, 
 BITS = 0xEF
 
 
-@kernel
+@inner
 def is_off(st: State, address: int) -> bool:
     """Tell whether a register's part is switched off."""
     off = st[PRR]
@@ -69,7 +69,7 @@ def is_off(st: State, address: int) -> bool:
     return bool((off & PRUSART0 and UCSR0A <= address <= UDR0) or (off & PRADC and ADCL <= address <= ADMUX))
 
 
-@kernel
+@inner
 def write_power_reduction(st: State, value: int, cycle: int) -> None:
     """Write PRR."""
     changed = (st[PRR] ^ value) & BITS
@@ -85,7 +85,7 @@ def write_power_reduction(st: State, value: int, cycle: int) -> None:
         st[ADCSRA] &= ~ADSC
 
 
-@kernel
+@inner
 def switch_timer(st: State, t: int, on: bool, cycle: int) -> None:
     """Stop the timer's clock, or let it go on as TCCRnB says."""
     advance_timer(st, t, cycle)
@@ -94,7 +94,7 @@ def switch_timer(st: State, t: int, on: bool, cycle: int) -> None:
     plan_timer(st, t)
 
 
-@kernel
+@inner
 def switch_usart(st: State, on: bool, cycle: int) -> None:
     """Drop what was under way; when switched on, look for start bits from now on."""
     st[RX_ACTIVE] = 0

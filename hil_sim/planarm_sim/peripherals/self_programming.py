@@ -7,7 +7,7 @@ CPU stands still for pages of the other one (27.4).
 
 from __future__ import annotations
 
-from planarm_sim.cpu.compiled import kernel  # kernel_cache: see there
+from planarm_sim.cpu.compiled import inner, kernel  # kernel_cache: see there
 from planarm_sim.cpu.layout import (
     BOOT_START,
     CYCLE,
@@ -34,7 +34,7 @@ PAGE_CYCLES = 72_000
 EEPE = 1 << 1  # EECR
 
 
-@kernel
+@inner
 def write_spm_control(st: State, value: int, cycle: int) -> None:
     """Write SPMCSR: choose what the next SPM does; nothing but SPMIE while flash or EEPROM is being written."""
     if st[EECR] & EEPE:  # 27.8.8

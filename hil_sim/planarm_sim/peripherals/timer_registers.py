@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from planarm_sim.cpu.compiled import inlined, kernel  # kernel_cache: see there
+from planarm_sim.cpu.compiled import inlined, inner  # kernel_cache: see there
 from planarm_sim.cpu.layout import (
     AT_BOTTOM,
     AT_MAX,
@@ -150,13 +150,13 @@ def power_up_timers(st: State) -> None:
         st[t + F_SHIFT] = CLOCK_STOPPED
 
 
-@kernel
+@inner
 def clock_setting(t: int, control_b: int) -> int:
     """F_SHIFT as CSn2:0 of TCCRnB say."""
     return int(CLOCKS_2[control_b & 7] if t == TIMER2 else CLOCKS_01[control_b & 7])
 
 
-@kernel
+@inner
 def apply_control(st: State, t: int, cycle: int) -> None:
     """Act on TCCRnA and TCCRnB as they now stand: mode, outputs, clock."""
     control_a = st[st[t + F_TCCRA]]
@@ -172,7 +172,7 @@ def apply_control(st: State, t: int, cycle: int) -> None:
     st[t + F_SYNC] = cycle
 
 
-@kernel
+@inner
 def write_timer8(st: State, t: int, address: int, value: int, cycle: int) -> None:
     """Write a register of timer 0 or 2; their five registers stand in one order."""
     advance_timer(st, t, cycle)
@@ -192,7 +192,7 @@ def write_timer8(st: State, t: int, address: int, value: int, cycle: int) -> Non
     plan_timer(st, t)
 
 
-@kernel
+@inner
 def read_count8(st: State, t: int, cycle: int) -> int:
     """Read TCNT0 or TCNT2; all other registers of these timers read as written."""
     advance_timer(st, t, cycle)
@@ -239,7 +239,7 @@ def read_timer1(st: State, address: int, cycle: int) -> int:
     return int(word & 0xFF)
 
 
-@kernel
+@inner
 def timer_of(address: int) -> int:
     """Block of the timer whose TIFRn or TIMSKn is at `address`."""
     if address in (TIFR0, TIMSK0):
@@ -247,21 +247,21 @@ def timer_of(address: int) -> int:
     return TIMER1 if address in (TIFR1, TIMSK1) else TIMER2
 
 
-@kernel
+@inner
 def write_timer_flags(st: State, address: int, value: int, cycle: int) -> None:
     """Write TIFRn: ones clear flags."""
     advance_timer(st, timer_of(address), cycle)
     st[address] &= ~value
 
 
-@kernel
+@inner
 def read_timer_flags(st: State, address: int, cycle: int) -> int:
     """Read TIFRn."""
     advance_timer(st, timer_of(address), cycle)
     return int(st[address])
 
 
-@kernel
+@inner
 def write_timer_mask(st: State, address: int, value: int, cycle: int) -> None:
     """Write TIMSKn."""
     t = timer_of(address)
@@ -270,7 +270,7 @@ def write_timer_mask(st: State, address: int, value: int, cycle: int) -> None:
     plan_timer(st, t)
 
 
-@kernel
+@inner
 def write_prescaler_control(st: State, value: int, cycle: int) -> None:
     """Write GTCCR: PSRSYNC and PSRASY restart the prescalers; with TSM they stay in reset (datasheet, 17.4.1)."""
     hold = value & TSM != 0

@@ -8,7 +8,7 @@ and the pin one timer clock after TCNT = OCRnx (figures 15-10, 15-11, 16-10), TO
 
 from __future__ import annotations
 
-from planarm_sim.cpu.compiled import inlined, kernel  # kernel_cache: see there
+from planarm_sim.cpu.compiled import inlined, inner, kernel  # kernel_cache: see there
 from planarm_sim.cpu.layout import (
     AT_BOTTOM,
     AT_MAX,
@@ -108,7 +108,7 @@ def clocks_to_event(st: State, t: int, matches: int) -> int:
     return int(clocks)
 
 
-@kernel
+@inner
 def advance_timer(st: State, t: int, cycle: int) -> None:
     """Work the timer out up to and including the timer clock at `cycle`."""
     if not clock_runs(st, t):
@@ -134,7 +134,7 @@ def advance_timer(st: State, t: int, cycle: int) -> None:
     st[t + F_SYNC] = max(st[t + F_SYNC], origin + (last << shift))
 
 
-@kernel
+@inner
 def clock_timer(st: State, t: int, cycle: int) -> None:
     """One timer clock at `cycle`: leave the present count, with all that follows from it."""
     count = st[t + F_COUNT]
@@ -192,7 +192,7 @@ def step_count(st: State, t: int, count: int, is_top: bool) -> bool:
     return False
 
 
-@kernel
+@inner
 def drive_output(
     st: State, t: int, channel: int, matched: int, wraps: bool, is_top: bool, is_bottom: bool, cycle: int
 ) -> None:
@@ -222,7 +222,7 @@ def drive_output(
         latch_output(st, t, channel, action, cycle)
 
 
-@kernel
+@inner
 def latch_output(st: State, t: int, channel: int, action: int, cycle: int) -> None:
     """Toggle, clear or set OCnx, and with it the pin."""
     before = st[t + F_LATCH_A + channel]
@@ -232,7 +232,7 @@ def latch_output(st: State, t: int, channel: int, action: int, cycle: int) -> No
         set_override(st, st[t + F_PIN_A + channel], True, after != 0, cycle)
 
 
-@kernel
+@inner
 def plan_timer(st: State, t: int) -> None:
     """Note when the CPU loop has to look at this timer next."""
     watched = st[st[t + F_TIMSK]] | st[t + F_TRIGGERS]
@@ -248,7 +248,7 @@ def plan_timer(st: State, t: int) -> None:
     st[st[t + F_DUE]] = due
 
 
-@kernel
+@inner
 def set_outputs(st: State, t: int, com_a: int, com_b: int, cycle: int) -> None:
     """Take new effective COM values: connect or disconnect the two pins."""
     st[t + F_COM_A] = com_a
@@ -275,7 +275,7 @@ def set_mode(st: State, t: int, slope: int, top_source: int, top_fixed: int, loa
         st[t + F_OCR_B] = st[t + F_BUFFER_A + 1]
 
 
-@kernel
+@inner
 def effective_com(com: int, slope: int, toggles: bool) -> int:
     """COMnx1:0 as it acts: in PWM modes 1 toggles only where the mode allows it, else the pin is not connected."""
     if com == COM_TOGGLE and slope != SLOPE_COUNT and not toggles:
@@ -283,7 +283,7 @@ def effective_com(com: int, slope: int, toggles: bool) -> int:
     return com
 
 
-@kernel
+@inner
 def write_count(st: State, t: int, value: int) -> None:
     """Write TCNTn: the match at the next timer clock is blocked (datasheet, 15.6.2)."""
     st[t + F_COUNT] = value
@@ -298,7 +298,7 @@ def write_compare(st: State, t: int, channel: int, value: int) -> None:
         st[t + F_OCR_A + channel] = value
 
 
-@kernel
+@inner
 def force_compare(st: State, t: int, channels: int, cycle: int) -> None:
     """FOCnA (bit 7) and FOCnB (bit 6): act on the pins as a match would, in modes that are no PWM."""
     if st[t + F_SLOPE] != SLOPE_COUNT:

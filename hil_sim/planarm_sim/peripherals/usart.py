@@ -12,7 +12,7 @@ shift register's place (20.7.4: DOR is set when its start bit is found, so the o
 
 from __future__ import annotations
 
-from planarm_sim.cpu.compiled import constant, inlined, kernel  # kernel_cache: see there
+from planarm_sim.cpu.compiled import constant, inlined, inner, kernel  # kernel_cache: see there
 from planarm_sim.cpu.layout import (
     BAUD_ORIGIN,
     BIT_FRACTION,
@@ -60,19 +60,19 @@ ENTRY_DATA, ENTRY_FE, ENTRY_UPE = 0x1FF, 1 << 9, 1 << 10
 USBS, UPM1, UPM0 = 1 << 3, 1 << 5, 1 << 4  # UCSR0C
 
 
-@kernel
+@inner
 def divider_cycles(st: State) -> int:
     """Period of the baud rate divider: UBRR0 + 1 cycles."""
     return int(((st[UBRR0H] << 8) | st[UBRR0L]) + 1)
 
 
-@kernel
+@inner
 def samples_per_bit(st: State) -> int:
     """Divider periods per bit."""
     return 8 if st[UCSR0A] & U2X else 16
 
 
-@kernel
+@inner
 def data_bits(st: State) -> int:
     """Data bits per frame, 5 to 9 (datasheet, table 20-11)."""
     size = ((st[UCSR0C] >> 1) & 3) | (st[UCSR0B] & UCSZ2)
@@ -82,7 +82,7 @@ def data_bits(st: State) -> int:
 # --- Transmitter ---------------------------------------------------------------------------------------------
 
 
-@kernel
+@inner
 def start_frame(st: State, data: int, cycle: int) -> None:
     """Put a character into the transmit shift register; its start bit begins at `cycle`."""
     bits = 2 + data_bits(st) + (1 if st[UCSR0C] & UPM1 else 0) + (1 if st[UCSR0C] & USBS else 0)
@@ -93,7 +93,7 @@ def start_frame(st: State, data: int, cycle: int) -> None:
     st[HORIZON] = min(st[HORIZON], st[DUE_TX])
 
 
-@kernel
+@inner
 def end_frame(st: State, cycle: int) -> None:
     """The last stop bit is out: log the frame, go on with the buffered character or report completion."""
     count = st[TX_COUNT]
@@ -117,7 +117,7 @@ def end_frame(st: State, cycle: int) -> None:
         start_frame(st, st[TX_BUFFER], cycle)
 
 
-@kernel
+@inner
 def release_transmit_pin(st: State, cycle: int) -> None:
     """Give TXD back to the port."""
     st[FORCE_OUT + PORT_D] &= ~TXD
@@ -153,7 +153,7 @@ def line_level(st: State, cycle: int) -> int:
     return 1
 
 
-@kernel
+@inner
 def next_falling_edge(st: State, earliest: int) -> int:
     """First cycle from `earliest` on at which the line falls; frames that are over are dropped."""
     while st[RX_HEAD] < st[RX_TAIL]:
@@ -186,7 +186,7 @@ def plan_receiver(st: State) -> None:
     st[DUE_RX] = due
 
 
-@kernel
+@inner
 def receive_event(st: State, cycle: int) -> None:
     """A start bit is seen (sample 1), or the middle of the stop bit is reached."""
     if st[RX_ACTIVE]:
@@ -217,7 +217,7 @@ def majority(st: State, first: int, offset: int, period: int) -> int:
     return 1 if ones >= 2 else 0
 
 
-@kernel
+@inner
 def sampled_bits(st: State) -> int:
     """All bits of the frame being received, start bit first in bit 0."""
     first = st[RX_FIRST_SAMPLE]
@@ -240,7 +240,7 @@ def sampled_bits(st: State) -> int:
     return bits
 
 
-@kernel
+@inner
 def finish_frame(st: State, cycle: int) -> None:
     """Take the frame apart, and move it on to the receive buffer unless that is full."""
     size = data_bits(st)
@@ -264,7 +264,7 @@ def finish_frame(st: State, cycle: int) -> None:
     plan_receiver(st)
 
 
-@kernel
+@inner
 def is_data_frame(size: int, data: int, bits: int) -> bool:
     """In multi-processor mode: tell data from address by the ninth bit, or by the stop bit (datasheet, 20.9)."""
     if size == 9:
@@ -272,7 +272,7 @@ def is_data_frame(size: int, data: int, bits: int) -> bool:
     return (bits >> (size + 1)) & 1 == 0
 
 
-@kernel
+@inner
 def move_to_buffer(st: State) -> None:
     """Move the frame that waits in the shift register to the buffer if there is room; that clears DOR0."""
     if st[RX_WAITING] and st[RX_COUNT] < 2:
@@ -283,7 +283,7 @@ def move_to_buffer(st: State) -> None:
     update_receive_flags(st)
 
 
-@kernel
+@inner
 def update_receive_flags(st: State) -> None:
     """RXC0, FE0, UPE0 and RXB80 belong to the oldest byte of the buffer; DOR0 stands until the next byte moves in."""
     flags = st[UCSR0A] & (TXC | UDRE | U2X | MPCM)
@@ -312,7 +312,7 @@ def read_data(st: State) -> int:
 # --- Control -------------------------------------------------------------------------------------------------
 
 
-@kernel
+@inner
 def write_usart(st: State, address: int, value: int, cycle: int) -> None:
     """Write UCSR0A, UCSR0B, UCSR0C or UBRR0; a frame under way keeps the rate it began with."""
     if address == UCSR0A:
@@ -330,7 +330,7 @@ def write_usart(st: State, address: int, value: int, cycle: int) -> None:
         plan_receiver(st)
 
 
-@kernel
+@inner
 def write_enables(st: State, value: int, cycle: int) -> None:
     """Write UCSR0B: switch receiver and transmitter, and with them the pins."""
     changed = st[UCSR0B] ^ value

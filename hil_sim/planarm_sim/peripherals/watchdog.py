@@ -5,7 +5,7 @@ Its own 128 kHz oscillator is taken as exact: 2^(11 + WDP) of its periods, 125 C
 
 from __future__ import annotations
 
-from planarm_sim.cpu.compiled import kernel  # kernel_cache: see there
+from planarm_sim.cpu.compiled import inner, kernel  # kernel_cache: see there
 from planarm_sim.cpu.layout import (
     DUE_WATCHDOG,
     HORIZON,
@@ -37,14 +37,14 @@ def plan_watchdog(st: State, cycle: int) -> None:
         st[DUE_WATCHDOG] = NEVER
 
 
-@kernel
+@inner
 def restart_watchdog(st: State, cycle: int) -> None:
     """WDR: count from zero again."""
     st[WDT_ORIGIN] = cycle
     plan_watchdog(st, cycle)
 
 
-@kernel
+@inner
 def write_watchdog(st: State, value: int, cycle: int) -> None:
     """Write WDTCSR: WDE and WDP change only within four cycles of a write of WDCE and WDE together."""
     before = st[WDTCSR]
@@ -66,7 +66,7 @@ def write_watchdog(st: State, value: int, cycle: int) -> None:
     plan_watchdog(st, cycle)
 
 
-@kernel
+@inner
 def watchdog_timeout(st: State, cycle: int) -> None:
     """Raise the interrupt flag, or ask for a reset."""
     if st[WDTCSR] & WDIE:

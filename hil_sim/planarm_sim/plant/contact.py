@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from planarm_sim.cpu.compiled import kernel  # kernel_cache: see there
+from planarm_sim.cpu.compiled import inner  # kernel_cache: see there
 from planarm_sim.plant.spec import CircleObstacle, PolygonObstacle
 
 Floats = NDArray[np.float64]
@@ -50,7 +50,7 @@ def obstacle_arrays(obstacles: Sequence[CircleObstacle | PolygonObstacle]) -> Ob
     )
 
 
-@kernel
+@inner
 def touch(
     ax: float, ay: float, bx: float, by: float, half_width: float, obstacles: Obstacles, k: int
 ) -> tuple[float, float, float, float]:
@@ -76,7 +76,7 @@ def touch(
     return touch_polygon(ax, ay, bx, by, half_width, obstacles.vertices[first:end])
 
 
-@kernel
+@inner
 def touch_polygon(
     ax: float, ay: float, bx: float, by: float, half_width: float, vertices: Floats
 ) -> tuple[float, float, float, float]:
@@ -103,7 +103,7 @@ def touch_polygon(
     return deepest, nx, ny, place
 
 
-@kernel
+@inner
 def from_point(px: float, py: float, ax: float, ay: float, bx: float, by: float) -> tuple[float, float, float, float]:
     """Return the segment's point nearest to p as a share, the unit vector from p to it, and its distance."""
     sx, sy = bx - ax, by - ay

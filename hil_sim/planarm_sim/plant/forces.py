@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from planarm_sim.cpu.compiled import kernel  # kernel_cache: see there
+from planarm_sim.cpu.compiled import inner  # kernel_cache: see there
 from planarm_sim.plant.contact import Obstacles, touch
 from planarm_sim.plant.layout import LEFT, STOPPED, TOUCHED, Body, Floats, State, Work, mark
 
@@ -15,7 +15,7 @@ STOP_NM_RAD = 2000.0
 STOP_NM_S = 2.0
 
 
-@kernel
+@inner
 def push(body: Body, obstacles: Obstacles, state: State, work: Work, cycle: int, marks: Floats, marked: int) -> int:
     """Write into work.pushed the torques on the directions by contacts, stops and outside torques, for this step."""
     n = len(body.lengths)
@@ -56,7 +56,7 @@ def push(body: Body, obstacles: Obstacles, state: State, work: Work, cycle: int,
     return marked
 
 
-@kernel
+@inner
 def press(body: Body, state: State, pushed: Floats, i: int, place: float, depth: float, nx: float, ny: float) -> float:
     """Add the torques of a contact at a place of link i; return the force in newtons."""
     n = len(body.lengths)

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from planarm_sim.cpu.compiled import kernel  # kernel_cache: see there
+from planarm_sim.cpu.compiled import inner  # kernel_cache: see there
 from planarm_sim.plant.layout import Body, Drive, State, Work
 from planarm_sim.plant.rigid_body import mass_matrix, solve_in_place, substitute
 
 FRICTION_SWEEPS = 8
 
 
-@kernel
+@inner
 def rub(body: Body, drive: Drive, state: State, work: Work, h: float) -> None:
     """Dry friction of rotors and joints: impulses that bring them to rest as far as friction can."""
     n, motors = len(body.lengths), len(drive.gear)

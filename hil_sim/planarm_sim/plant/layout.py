@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from planarm_sim.cpu.compiled import kernel  # kernel_cache: see there
+from planarm_sim.cpu.compiled import inner  # kernel_cache: see there
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -94,7 +94,7 @@ class Work(NamedTuple):
     impulse: Floats
 
 
-@kernel
+@inner
 def mark(marks: Floats, marked: int, cycle: int, kind: int, first: int, second: int, value: float) -> int:
     """Write a mark while there is room."""
     if marked < len(marks):

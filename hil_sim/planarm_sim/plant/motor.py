@@ -14,17 +14,17 @@ as soon as their diodes have emptied them. (Acarnley, Stepping Motors, 4th ed., 
 
 from __future__ import annotations
 
-from planarm_sim.cpu.compiled import kernel  # kernel_cache: see there
+from planarm_sim.cpu.compiled import inner  # kernel_cache: see there
 
 
-@kernel
+@inner
 def torque_nm(k: float, detent: float, current_a: float, current_b: float, sin: float, cos: float) -> float:
     """Return the torque on the rotor; `sin` and `cos` are those of N theta."""
     sin_2, cos_2 = 2.0 * sin * cos, cos * cos - sin * sin
     return k * (current_b * cos - current_a * sin) - detent * 2.0 * sin_2 * cos_2
 
 
-@kernel
+@inner
 def chopped(current: float, wanted: float, emf: float, supply: float, r: float, l_over_h: float) -> float:
     """Return a phase's current one step later: the wanted one, or as near as the supply can bring it.
 
@@ -42,7 +42,7 @@ def chopped(current: float, wanted: float, emf: float, supply: float, r: float, 
     return min(max(wanted, lowest), highest)
 
 
-@kernel
+@inner
 def drained(current: float, emf: float, supply: float, r: float, l_over_h: float) -> float:
     """Return a phase's current one step later with the driver's outputs off: its diodes empty it, then it is open."""
     following = chopped(current, 0.0, emf, supply, r, l_over_h)

@@ -21,7 +21,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from planarm_sim.cpu.compiled import kernel  # kernel_cache: see there
+from planarm_sim.cpu.compiled import inner, kernel  # kernel_cache: see there
 from planarm_sim.plant.spec import Link
 
 Floats = NDArray[np.float64]
@@ -41,7 +41,7 @@ def inertia_constants(links: Sequence[Link]) -> tuple[Floats, Floats]:
     return a, first
 
 
-@kernel
+@inner
 def mass_matrix(a: Floats, phi: Floats, out: Floats) -> None:
     """Write A_ij cos(phi_i - phi_j)."""
     n = len(phi)
@@ -51,7 +51,7 @@ def mass_matrix(a: Floats, phi: Floats, out: Floats) -> None:
             out[i, j] = out[j, i] = a[i, j] * np.cos(phi[i] - phi[j])
 
 
-@kernel
+@inner
 def add_inertia_torques(a: Floats, b: Floats, gravity: float, phi: Floats, dphi: Floats, out: Floats) -> None:
     """Subtract what speeds and gravity ask for from the torques `out` on the directions."""
     n = len(phi)
@@ -64,7 +64,7 @@ def add_inertia_torques(a: Floats, b: Floats, gravity: float, phi: Floats, dphi:
             out[i] -= gravity * b[i] * np.cos(phi[i])
 
 
-@kernel
+@inner
 def solve_in_place(m: Floats, x: Floats) -> None:
     """Replace x by m^-1 x by Cholesky's method; m, positive definite, is overwritten by its factor."""
     n = len(x)
@@ -79,7 +79,7 @@ def solve_in_place(m: Floats, x: Floats) -> None:
     substitute(m, x)
 
 
-@kernel
+@inner
 def substitute(factor: Floats, x: Floats) -> None:
     """Replace x by (factor factor^T)^-1 x."""
     n = len(x)

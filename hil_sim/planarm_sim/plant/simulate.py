@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from planarm_sim.cpu.compiled import kernel  # kernel_cache: see there
+from planarm_sim.cpu.compiled import inner, kernel  # kernel_cache: see there
 from planarm_sim.plant.contact import Obstacles
 from planarm_sim.plant.forces import push
 from planarm_sim.plant.friction import rub
@@ -80,7 +80,7 @@ def advance(
     return logged, marked
 
 
-@kernel
+@inner
 def update_currents(drive: Drive, state: State, h: float) -> None:
     """Step the currents, with the rotors where they will be in the middle of the step."""
     n2 = 2 * state.coulomb.size
@@ -101,7 +101,7 @@ def update_currents(drive: Drive, state: State, h: float) -> None:
             state.currents[m, 1] = drained(b, emf_b, supply, r, l_over_h)
 
 
-@kernel
+@inner
 def runge_kutta(body: Body, drive: Drive, state: State, work: Work, h: float) -> None:
     """Move links and rotors by one step."""
     y, at, k = state.y, work.y, work.stages
@@ -116,7 +116,7 @@ def runge_kutta(body: Body, drive: Drive, state: State, work: Work, h: float) ->
         y[i] += h / 6.0 * (k[0, i] + 2.0 * (k[1, i] + k[2, i]) + k[3, i])
 
 
-@kernel
+@inner
 def slopes(body: Body, drive: Drive, state: State, work: Work, y: Floats, out: Floats) -> None:
     """Write dy/dt."""
     n, motors = len(body.lengths), len(drive.gear)
@@ -163,7 +163,7 @@ def slopes(body: Body, drive: Drive, state: State, work: Work, y: Floats, out: F
     solve_in_place(work.mass, torques)
 
 
-@kernel
+@inner
 def note_slips(drive: Drive, state: State, cycle: int, marks: Floats, marked: int) -> int:
     """Note each electrical turn, four full steps, by which a rotor falls behind or gets ahead of its driver."""
     n2, motors = 2 * state.coulomb.size, len(drive.gear)
@@ -176,7 +176,7 @@ def note_slips(drive: Drive, state: State, cycle: int, marks: Floats, marked: in
     return marked
 
 
-@kernel
+@inner
 def note_switches(switches: Switches, state: State, cycle: int, marks: Floats, marked: int) -> int:
     """Note each limit switch that a joint begins or ceases to press."""
     for k in range(len(switches.joint)):
