@@ -46,8 +46,9 @@ F = TypeVar("F", bound=Callable[..., Any])
 
 CACHE_DIR_VARIABLE = "PLANARM_CACHE_DIR"
 KEPT_BUILDS = 16
-_ALGEBRA = (b"numba_xx", b"numba_ez")
-"""How the names of Numba's ways to BLAS and LAPACK begin."""
+_BLAS = "scipy.linalg.cython_blas"
+_DOORS = (b"NRT_", b"numba_xx", b"numba_ez")
+"""How the names of Numba's ways to its run-time library, BLAS and LAPACK begin."""
 
 _DECORATED = re.compile(rb"^@kernel$", re.M)
 _KEY_NAME = re.compile(r"[0-9a-f]{16}")
@@ -64,6 +65,13 @@ def kernel(function: F) -> F:
     With NUMBA_DISABLE_JIT=1 the plain Python function is returned. Raises OSError when `PLANARM_CACHE_DIR`
     is set to a folder that cannot be written.
     """
+    compiled: Any = _with_cache(function)
+    if compiled is not function:
+        _import_array_functions()
+    return cast("F", compiled)
+
+
+def _with_cache(function: F) -> F:
     numba: Any = _numba()
     config = numba.config
     if config.DISABLE_JIT:
@@ -82,7 +90,19 @@ def kernel(function: F) -> F:
             compiled = numba.njit(cache=True, no_cfunc_wrapper=True)(function)
         finally:
             config.CACHE_DIR = before
-    _load_at_once(compiled._cache)
+    return cast("F", compiled)
+
+
+def bare_kernel(function: F) -> F:
+    """As `kernel`, for a function that makes no arrays: without Numba's run-time library, and loaded at once.
+
+    Numba counts references to every array that a function is given, with two atomic additions per array and call: more
+    than most small kernels take for their work. Without its run-time library it does not.
+    """
+    compiled: Any = _with_cache(function)
+    if compiled is not function:  # plain Python when the compiler is switched off
+        compiled.targetoptions["_nrt"] = False
+        _load_at_once(compiled._cache)
     return cast("F", compiled)
 
 
@@ -94,9 +114,9 @@ def is_switched_off() -> bool:
 def _load_at_once(cache: Any) -> None:  # noqa: ANN401 - Numba has no types
     """Have a function's cache load compiled code without Numba's registries first.
 
-    These say how to compile every function that Numba knows. Machine code needs none of them, unless it calls BLAS or
-    LAPACK, whose doors Numba opens as it fills them; and they take half of a cached start. Whatever does compile fills
-    them itself. Should a later Numba load in another way, it may.
+    These say how to compile every function that Numba knows. Machine code needs none of them, unless it calls the
+    run-time library, BLAS or LAPACK, whose doors Numba opens as it fills them; and they take half of a cached start.
+    Whatever does compile fills them itself. Should a later Numba load in another way, it may.
     """
     parts = ("_guard_against_spurious_io_errors", "_cache_file", "_index_key", "_impl")
     if not all(hasattr(cache, part) for part in parts):
@@ -108,6 +128,7 @@ def _load_at_once(cache: Any) -> None:  # noqa: ANN401 - Numba has no types
             saved = cache._cache_file.load(cache._index_key(signature, target_context.codegen()))
             if saved is not None:
                 if not _is_plain(saved):
+                    _import_array_functions()
                     target_context.refresh()
                 loaded = cache._impl.rebuild(target_context, saved)
         return loaded
@@ -116,10 +137,10 @@ def _load_at_once(cache: Any) -> None:  # noqa: ANN401 - Numba has no types
 
 
 def _is_plain(saved: Any) -> bool:  # noqa: ANN401
-    """Tell whether what Numba saved is machine code without linear algebra; False as well for what looks unknown."""
+    """Tell whether what Numba saved is machine code through none of the doors; False as well for what looks unknown."""
     match saved:
         case ((_, "object", (bytes(machine_code), _)), *_):
-            return not any(name in machine_code for name in _ALGEBRA)
+            return not any(name in machine_code for name in _DOORS)
     return False
 
 
@@ -133,6 +154,24 @@ def _edited_since_start(module: str, source: Path) -> bool:
 def _numba() -> types.ModuleType:
     """Import Numba, here, so that only users of kernels wait for it."""
     return importlib.import_module("numba")
+
+
+@functools.cache
+def _import_array_functions() -> None:
+    """Import Numba's functions of arrays, which ask at once whether SciPy has a BLAS.
+
+    To ask, they import scipy.linalg: a third of a second, for kernels of which none needs a BLAS. Where SciPy is
+    installed an empty module stands for it meanwhile; a kernel that calls np.dot imports the real one when it is
+    compiled.
+    """
+    needless = _BLAS not in sys.modules and importlib.util.find_spec(_BLAS.partition(".")[0]) is not None
+    if needless:
+        sys.modules[_BLAS] = types.ModuleType(_BLAS)
+    try:
+        importlib.import_module("numba.np.arraymath")
+    finally:
+        if needless:
+            del sys.modules[_BLAS]
 
 
 def is_cold(package: str) -> bool:

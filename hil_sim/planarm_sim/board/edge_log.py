@@ -22,13 +22,18 @@ _PIN_INDICES = tuple(pin.index for pin in PINS)
 
 
 class EdgeLog:
-    """Edges of all pins, in order of time, since a cycle at which the pins had known levels."""
+    """Edges of all pins, in order of time, since a cycle at which the pins had known levels.
+
+    Attributes:
+        listeners: take every further edge.
+        start_cycle: since when edges are recorded.
+    """
 
     def __init__(self, chip: Chip) -> None:
         self._chip = chip
         self._edges: list[NDArray[Any]] = []
         self.listeners: list[Callable[[NDArray[Any]], None]] = []
-        self._start_cycle, self._start_levels = chip.cycle, self._levels()
+        self.start_cycle, self._start_levels = chip.cycle, self._levels()
 
     def collect(self) -> None:
         """Fetch the edges of the chip, and tell the listeners."""
@@ -49,7 +54,7 @@ class EdgeLog:
     def clear(self) -> None:
         """Forget what was recorded; the log begins now."""
         self._edges = []
-        self._start_cycle, self._start_levels = self._chip.cycle, self._levels()
+        self.start_cycle, self._start_levels = self._chip.cycle, self._levels()
 
     def take(self) -> NDArray[Any]:
         """Return everything recorded, and forget it."""
@@ -68,7 +73,7 @@ class EdgeLog:
         levels = [start[pin_place(name)] for name in names]
         edges, done = self._recorded(), 0
         numbers = () if interrupts is None else ("isr",)
-        with VcdWriter(path, names, levels, self._start_cycle, numbers) as vcd:
+        with VcdWriter(path, names, levels, self.start_cycle, numbers) as vcd:
             for cycle, vector in interrupts or ():
                 until = int(np.searchsorted(edges["cycle"], cycle, side="right"))
                 vcd.write(edges[done:until], signal_of)
@@ -79,12 +84,12 @@ class EdgeLog:
 
     def snapshot(self) -> EdgeLogState:
         """What `restore` goes back to."""
-        return tuple(self._edges), self._start_cycle, self._start_levels
+        return tuple(self._edges), self.start_cycle, self._start_levels
 
     def restore(self, state: EdgeLogState) -> None:
         """Go back to a snapshot of any board's log; listeners stay."""
         self._edges = list(state[0])
-        self._start_cycle, self._start_levels = state[1:]
+        self.start_cycle, self._start_levels = state[1:]
 
     def _recorded(self) -> NDArray[Any]:
         """All recorded edges in one array; joined once, then kept so."""

@@ -296,7 +296,7 @@ class Uno:
         from planarm_sim.insight.figures import running_interrupts  # noqa: PLC0415 - a start need not wait for it
 
         changes = running_interrupts(self._observer.intervals())
-        return [(cycle, vector) for cycle, vector in changes if cycle >= self._log_start_cycle]
+        return [(cycle, vector) for cycle, vector in changes if cycle >= self._edges.start_cycle]
 
     def observe(self, *, symbols: str | Path | None = None, keep_intervals: bool = True) -> None:
         """Watch the program from now on, or anew; see `insight`. The board does the same, a few times slower.

@@ -13,15 +13,8 @@ F = TypeVar("F", bound=Callable[..., Any])
 
 
 def kernel(function: F) -> F:
-    """Compile `function` as `planarm_wire.kernel_cache.kernel` does, for a kernel that makes no arrays.
-
-    Numba counts references to every array that a function is given, with two atomic additions per array and
-    call: more than most of these kernels take for their work. Without its run-time library it does not.
-    """
-    compiled: Any = kernel_cache.kernel(function)
-    if hasattr(compiled, "targetoptions"):  # plain Python when the compiler is switched off
-        compiled.targetoptions["_nrt"] = False
-    return cast("F", compiled)
+    """Compile `function` as `planarm_wire.kernel_cache.bare_kernel` does: it must make no arrays."""
+    return kernel_cache.bare_kernel(function)
 
 
 def inner(function: F) -> F:

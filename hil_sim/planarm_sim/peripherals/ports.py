@@ -57,7 +57,7 @@ CAPTURE_PIN, CLOCK0_PIN, CLOCK1_PIN = 1 << 0, 1 << 4, 1 << 5  # PB0, PD4, PD5
 INT0_PIN = 1 << 2  # PD2; INT1 is PD3
 
 
-@inner
+@inlined
 def log_edge(st: State, cycle: int, pin: int, level: int) -> None:
     """Log an edge that the chip made, by driving or pulling up; stop the CPU loop when the log is nearly full."""
     count = st[EDGE_COUNT]
@@ -96,7 +96,7 @@ def refresh_port(st: State, port: int, cycle: int) -> None:
     st[DIRECTION + port] = direction
 
 
-@inner
+@inlined
 def notify_inputs(st: State, port: int, changed: int, level: int, cycle: int) -> None:
     """Send what a change of levels means to peripherals into the input pipeline."""
     effects = 0
@@ -140,7 +140,7 @@ def clocks(shift: int, level: int) -> bool:
     return shift == CLOCK_RISING if level else shift == CLOCK_FALLING
 
 
-@inner
+@inlined
 def schedule_capture(st: State, level: int, cycle: int) -> None:
     """An edge of ICP1: capture after the synchroniser and, when on, the noise canceller."""
     wanted = (level != 0) == (st[TCCR1B] & ICES1 != 0)
