@@ -90,13 +90,16 @@ class ArmFindings:
         return [f"{self.touches[0]} ({len(self.touches)} touches in all)"] if self.touches else []
 
 
-def judge_arm(plan: Plan, record: ArmRecord, start_tick: int) -> ArmFindings:
+def judge_arm(
+    plan: Plan, record: ArmRecord, start_tick: int, obstacles: tuple[Scene, int] | None = None
+) -> ArmFindings:
     """Hold what the arm did against the plan.
 
     Args:
         plan: what was planned.
         record: what the arm did.
         start_tick: moment of the plan's zero, on the record's clock.
+        obstacles: whose, and the tick of their time 0; None takes the plan's scene and zero.
     """
     trajectory = plan.trajectory
     t_s = (record.ticks - start_tick) / TICKS_HZ
@@ -105,7 +108,8 @@ def judge_arm(plan: Plan, record: ArmRecord, start_tick: int) -> ArmFindings:
         during[-1] = True
     t_s, q_rad = t_s[during], record.q_rad[during]
     arm = Arm.from_spec(plan.scene.arm)
-    record = replace(record, touches=(*record.touches, *_moving_touches(plan.scene, t_s, q_rad, start_tick)))
+    of, zero_tick = obstacles or (plan.scene, start_tick)
+    record = replace(record, touches=(*record.touches, *moving_touches(record, of, zero_tick)))
     planned = trajectory.sample(np.clip(t_s, 0.0, trajectory.duration_s))[0]
     errors_cm = forward(arm, q_rad)[:, -1] - forward(arm, planned)[:, -1]
 
@@ -121,17 +125,24 @@ def judge_arm(plan: Plan, record: ArmRecord, start_tick: int) -> ArmFindings:
     )
 
 
-def _moving_touches(scene: Scene, t_s: NDArray[np.float64], q_rad: NDArray[np.float64], start_tick: int) -> list[Touch]:
+def moving_touches(record: ArmRecord, scene: Scene, zero_tick: int) -> list[Touch]:
     """Return the first touch of each moving obstacle with the arm as it really moved; resting ones touch by themselves.
 
-    The motion's start is the obstacles' time 0.
+    Args:
+        record: what the arm did.
+        scene: the obstacles.
+        zero_tick: their time 0, on the record's clock.
     """
     if scene.moving is None:
+        return []
+    since = record.ticks >= zero_tick
+    t_s, q_rad = (record.ticks[since] - zero_tick) / TICKS_HZ, record.q_rad[since]
+    if not len(t_s):
         return []
     moving = moving_set(scene, float(t_s[-1]))
     found = first_touches(moving, t_s, forward(Arm.from_spec(scene.arm), q_rad), 0.5 * scene.arm.link_width_cm)
     return [
-        Touch(start_tick + round(t_s[pose] * TICKS_HZ), int(link) + 1, number)
+        Touch(zero_tick + round(t_s[pose] * TICKS_HZ), int(link) + 1, number)
         for number, ((pose, link), obstacle) in enumerate(zip(found, scene.obstacles, strict=True), start=1)
         if pose >= 0 and obstacle.motion is not None
     ]

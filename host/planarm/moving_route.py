@@ -9,15 +9,26 @@ import numpy as np
 
 from planarm.errors import NoPathError, SceneError
 from planarm.model.arm import Arm
+from planarm.model.kinematics import forward
+from planarm.model.moving import moving_set
 from planarm.scene import Point, Scene
-from planarm.search.moving.space_time import MovingStatus, SpaceTimeResult, search_space_time
+from planarm.search.moving.space_time import MovingStatus, SpaceTimeResult, search_space_time, world_of
 from planarm.search.moving.timed_path import TimedPath
 from planarm.smoothing.joint_spline import JointSpline
 from planarm.smoothing.swarm import SwarmResult, SwarmSettings, fly
 from planarm.smoothing.timed_spline import delay_margin_s, from_nodes, judge, tip_length_cm
+from planarm.workspace.cell_poses import most_turn_rad
 from planarm.workspace.check_task import pose_problem
 from planarm.workspace.moving_map import MovingMap, build_moving_map, moving_spec
+from planarm.workspace.moving_proof import MovingWorld, prove_cell_move, prove_moving_piece
+from planarm.workspace.proof import PROVED
 from planarm.workspace.world import build_world, elbow_sides
+
+LOOK_S = 0.05
+"""To this the time is told at which a resting arm is touched."""
+
+NEAR_CELLS = 1.6
+"""A pose that is no node is joined to nodes this near."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -57,12 +68,13 @@ def find_moving_route(scene: Scene, margin_cm: float) -> MovingRoute:
         began_s = perf_counter()
         try:
             moving_map = build_moving_map(scene, side, margin_cm)
-            start, goal = (_cell(scene, moving_map, key) for key in ("start_cm", "goal_cm"))
+            goal = _cell(scene, moving_map, "goal_cm")
+            search = _from_pose if scene.task.start_rad else _from_node
+            result = search(scene, moving_map, goal)
         except SceneError as error:  # on this side; told below when it is so on all sides
             problems.append(error)
             continue
-        map_s = perf_counter() - began_s
-        result = search_space_time(moving_map, start, goal)
+        map_s = perf_counter() - began_s - result.search_s
         if result.path is None:
             problems.append(_no_motion(scene, moving_map, result))
         else:
@@ -98,6 +110,40 @@ def _smoothed(
         result.search_s,
         result.proofs,
     )
+
+
+def _from_node(scene: Scene, moving_map: MovingMap, goal: int) -> SpaceTimeResult:
+    """Search from the task's start, a node."""
+    return search_space_time(moving_map, _cell(scene, moving_map, "start_cm"), goal)
+
+
+def _from_pose(scene: Scene, moving_map: MovingMap, goal: int) -> SpaceTimeResult:
+    """Search from a pose that is no node: in the first sample to a node near by, then as ever; the earliest arrival.
+
+    Raises:
+        SceneError: the pose is on the other elbow side.
+    """
+    q_rad, poses, clock = np.array(scene.task.start_rad), moving_map.poses, moving_map.clock
+    if q_rad[1] * moving_map.arm.side > 0.0:
+        raise SceneError(scene.source, "task.start_rad", f"is no pose with its elbow {moving_map.elbow!r}")
+    tip = forward(Arm.from_spec(scene.arm), q_rad)[-1] - scene.arm.base_cm
+    near = np.flatnonzero(np.hypot(*(poses.tip_cm - tip).T) <= NEAR_CELLS * moving_map.cell_cm)
+    most, world, piece = most_turn_rad(scene, clock.sample_s), world_of(moving_map), np.empty((4, 2))
+    best = SpaceTimeResult(MovingStatus.START_TAKEN, None, 0, 0, 0.0)
+    spent_s, proofs = 0.0, 0
+    for n in near:
+        if (np.abs(poses.q_rad[n] - q_rad) > most).any():
+            continue
+        proofs += 1
+        if not prove_cell_move(world, q_rad, poses.q_rad[n], 0.0, clock.sample_s, clock.delay_s, piece):
+            continue
+        result = search_space_time(moving_map, int(poses.cell[n]), goal, since=1)
+        spent_s, proofs = spent_s + result.search_s, proofs + result.proofs
+        if result.path is None:
+            best = best if best.path else result
+        elif best.path is None or result.path.arrival + 1 < best.path.arrival:
+            best = replace(result, path=result.path.after(q_rad, tip + scene.arm.base_cm))
+    return replace(best, search_s=spent_s, proofs=proofs)
 
 
 def _cell(scene: Scene, moving_map: MovingMap, key: str) -> int:
@@ -137,3 +183,23 @@ def _no_motion(scene: Scene, moving_map: MovingMap, result: SpaceTimeResult) -> 
     error = NoPathError(f"{scene.source}: elbow {side!r}: {reason}")
     error.advice, error.fields = advice, {"elbow": side, "cause": result.status.value}
     return error
+
+
+def rest_problem(scene: Scene, for_s: float) -> str:
+    """Say which obstacle touches the arm in its task's start pose, and when; empty when none does.
+
+    Args:
+        scene: with joint angles at its task's start; time 0 is now.
+        for_s: how long the arm rests; beyond the horizon nothing is said.
+    """
+    spec, arm = moving_spec(scene), scene.arm
+    until_s = min(for_s, spec.horizon_s)
+    (l1, l2), (x, y) = arm.link_lengths_cm, arm.base_cm
+    world = MovingWorld(l1, l2, x, y, scene.margin_cm, moving_set(scene, until_s))
+    for begin_s in np.arange(0.0, until_s, LOOK_S):
+        piece = np.zeros((4, 2))
+        piece[0] = scene.task.start_rad
+        verdict, _, obstacle = prove_moving_piece(world, piece, begin_s, min(LOOK_S, until_s - begin_s), 0.0)
+        if verdict != PROVED:
+            return f"obstacles[{obstacle + 1}] touches the resting arm after {begin_s:.2f} s"
+    return ""

@@ -6,7 +6,7 @@ scene -> FreeMap -> Path -> SmoothPath -> Trajectory -> StepTrain -> SegmentPlan
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import closing
 from dataclasses import asdict, replace
 from pathlib import Path
@@ -29,11 +29,13 @@ from planarm.fastest.task import fastest_path
 from planarm.gentle import ROOM_CM, gentle_motion, jerk_limits
 from planarm.link.arm_record import ArmSetup, ArmTrace
 from planarm.link.clock import Clock
+from planarm.link.exchange import StreamResult
 from planarm.link.stream import Stream, StreamProgress
 from planarm.link.transport import PinTrace, Transport, open_transport
 from planarm.model.arm import Arm
 from planarm.model.kinematics import forward
 from planarm.moving_route import find_moving_route
+from planarm.moving_run import KeptTime, Timekeeper, stream_on_time
 from planarm.plan import Findings, Plan
 from planarm.plan_file import StoredPlan
 from planarm.record.outcome import Outcome, Seen, StreamLog
@@ -250,13 +252,12 @@ def run_scene(
     with closing(open_transport(port, scene.link.baud, setup)) as transport:
         log = StreamLog(transport.clock.now_s)
         recorded = record(transport, out, port, scene)
-        options = options_for(scene, plan.segments)
         watch, steer = [log.note], None
         if onlooker is not None:
             onlooker.begin(plan, transport.clock, emulated=transport.pins is not None)
             watch, steer = [log.note, onlooker.note], onlooker.steer
         try:
-            streamed = stream(plan.segments, plan.certificate, recorded, telling(notice, *watch), options, steer=steer)
+            plan, streamed, kept = carry_out(plan, recorded, notice, watch, steer)
         except (LinkError, DeviceFault, HostKilledError, CertificateError, StepsDifferError) as error:
             seen = look_at(plan, transport, SETTLE_AFTER_FAILURE_S)
             for line in seen.notes() if log.samples else ():
@@ -264,14 +265,45 @@ def run_scene(
             figures = {**planned_figures(plan), **seen_figures(seen.findings, seen.arm)}
             finish_run_folder(out, Outcome(plan, figures, tuple(log.samples), seen, error.told()))
             raise
-        seen = look_at(plan, transport, 0.0)
-    summary = summarise(plan, streamed, seen.findings, seen.arm)
+        seen = look_at(plan, transport, 0.0, kept)
+    summary = summarise(plan, streamed, seen.findings, seen.arm) | (kept.figures() if kept else {})
     finish_run_folder(out, Outcome(plan, summary, tuple(log.samples), seen))
     if seen.findings and not seen.findings.comparison.agrees:
         raise StepsDifferError(f"{scene.source}: {seen.findings.comparison.explain()}; see {out}")
     if seen.arm and not seen.arm.clean:
         raise StepsDifferError(f"{scene.source}: {seen.arm.explain()}; see {out}")
     return summary
+
+
+def carry_out(
+    plan: Plan,
+    transport: Transport,
+    notice: Notice,
+    watch: Sequence[Callable[[StreamProgress], None]],
+    steer: Callable[[Stream], None] | None,
+) -> tuple[Plan, StreamResult, KeptTime | None]:
+    """Stream a plan; one among moving obstacles by its clock, planned again where it falls behind.
+
+    Returns:
+        (the plan that arrived, its stream, how time was kept).
+    """
+    if plan.moving is None:
+        options = options_for(plan.scene, plan.segments)
+        tell = telling(notice, *watch)
+        return plan, stream(plan.segments, plan.certificate, transport, tell, options, steer=steer), None
+
+    def on_time(now: Plan, keeper: Timekeeper) -> StreamResult:
+        def steered(running: Stream) -> None:
+            keeper.steer(running)
+            if steer is not None:
+                steer(running)
+
+        options = replace(options_for(now.scene, now.segments), start_at_s=keeper.start_at_s)
+        tell = telling(notice, keeper.watch, *watch)
+        return stream(now.segments, now.certificate, transport, tell, options, steer=steered)
+
+    kept = stream_on_time(plan, transport.clock, on_time, lambda scene: plan_scene(scene, notice))
+    return kept.plan, kept.streamed, kept
 
 
 def judge_pins(plan: SegmentPlan, trace: PinTrace) -> Findings:
@@ -284,14 +316,21 @@ def judge_pins(plan: SegmentPlan, trace: PinTrace) -> Findings:
     return Findings(measured, compare_steps(planned, measured))
 
 
-def look_at(plan: Plan, transport: Transport, settle_s: float) -> Seen:
-    """Hold pins and emulated arm against the plan, after a while in which the board executes what it has queued."""
+def look_at(plan: Plan, transport: Transport, settle_s: float, kept: KeptTime | None = None) -> Seen:
+    """Hold pins and emulated arm against the plan, after a while in which the board executes what it has queued.
+
+    With `kept` the arm is held against the obstacles' own clock; after a new plan on the way the pins show more than
+    the last plan, so they are not held against it.
+    """
     if transport.pins is None:
         return Seen()
     if transport.arm:
         transport.arm.settle(settle_s)
+    if kept and kept.replans:
+        arm = judge_on_time(kept, transport.arm) if transport.arm else None
+        return Seen(transport.pins, None, arm, kept.start_tick)
     findings = judge_pins(plan.segments, transport.pins)
-    arm = judge_emulated_arm(plan, findings, transport.arm) if transport.arm else None
+    arm = judge_emulated_arm(plan, findings, transport.arm, kept) if transport.arm else None
     planned = [joint.ticks for joint in expand(plan.segments).steps]
     return Seen(transport.pins, findings, arm, start_tick_of(planned, [joint.ticks for joint in findings.measured]))
 
@@ -307,11 +346,18 @@ def telling(notice: Notice, *watchers: Callable[[StreamProgress], None]) -> Call
     return tell
 
 
-def judge_emulated_arm(plan: Plan, findings: Findings, trace: ArmTrace) -> ArmFindings:
+def judge_on_time(kept: KeptTime, trace: ArmTrace) -> ArmFindings:
+    """Let the emulated arm come to rest, and hold it against the last plan and against the obstacles all along."""
+    trace.settle(SETTLE_S)
+    return judge_arm(kept.plan, trace.record(), kept.start_tick, (kept.scene, kept.zero_tick))
+
+
+def judge_emulated_arm(plan: Plan, findings: Findings, trace: ArmTrace, kept: KeptTime | None = None) -> ArmFindings:
     """Let the emulated arm come to rest, and hold what it did against the plan."""
     trace.settle(SETTLE_S)
     planned = [joint.ticks for joint in expand(plan.segments).steps]
-    return judge_arm(plan, trace.record(), start_tick_of(planned, [joint.ticks for joint in findings.measured]))
+    start_tick = start_tick_of(planned, [joint.ticks for joint in findings.measured])
+    return judge_arm(plan, trace.record(), start_tick, (kept.scene, kept.zero_tick) if kept else None)
 
 
 def _waveform(trace: PinTrace, pin: str) -> Waveform:

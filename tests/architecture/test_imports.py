@@ -128,6 +128,16 @@ ALLOWED: dict[str, set[str]] = {
         "planarm.smoothing",
         "planarm.trajectory",
     },
+    # docs/decisions/0072: keeping time is a loop of streaming and planning
+    "planarm.moving_run": {
+        "planarm.errors",
+        "planarm.scene",
+        "planarm.model",
+        "planarm.link",
+        "planarm.moving_route",
+        "planarm.plan",
+        "planarm_wire",
+    },
     "planarm.pipeline": {
         "planarm",
         "planarm.gentle",
@@ -144,6 +154,7 @@ ALLOWED: dict[str, set[str]] = {
         "planarm.link",
         "planarm.analysis",
         "planarm.moving_route",
+        "planarm.moving_run",
         "planarm.plan",
         "planarm.plan_file",
         "planarm.record",

@@ -14,7 +14,7 @@ from planarm.link.arm_record import ArmSetup
 from planarm.link.transport import open_transport
 from planarm.model.arm import Arm
 from planarm.model.kinematics import forward
-from planarm.pipeline import judge_emulated_arm, judge_pins, plan_scene
+from planarm.pipeline import judge_emulated_arm, judge_pins, plan_scene, run_scene
 from planarm.scene import ObstacleMotion, load_scene
 from planarm.stepping.certify import certify
 from planarm.streaming import stream
@@ -77,6 +77,31 @@ def test_both_environments_run_at_their_own_pace(number, smoothing, sized):
     plan = plan_scene(environment(number, smoothing=smoothing), quiet)
     assert plan.certificate.ok, plan.certificate.explain()
     assert_as_planned_and_clear(plan, *on_the_bench(plan))
+
+
+PAUSE = """
+seed = 1
+zero = "first_step"
+[[faults]]
+kind = "host.pause"
+at_s = 3.0
+for_s = {for_s}
+"""
+
+
+@pytest.mark.parametrize(("for_s", "replans"), [(0.6, 0), (2.5, 1)], ids=["within its margin", "beyond"])
+def test_an_arm_that_is_held_up_goes_on_late_or_is_planned_again_and_touches_nothing(for_s, replans, tmp_path, sized):
+    """The host does nothing for a while: the queue starves, and the arm rests on its path until segments come."""
+    if not sized(0, 1):
+        pytest.skip("emulates a minute of motion: --full")
+    faults = tmp_path / "pause.toml"
+    faults.write_text(PAUSE.format(for_s=for_s))
+    summary = run_scene(environment(1, faster=1.6), "sim://", tmp_path / "out", quiet, faults=faults)
+    assert len(summary["replans"]) == replans
+    assert summary["arm_touches"] == 0
+    assert summary["arm_clean"]
+    assert summary["tip_error_mm"] < 0.1  # it has arrived
+    assert max([summary["late_s"], *(one["late_s"] for one in summary["replans"])]) > 0.5 * for_s
 
 
 def sooner(motion, by_s):

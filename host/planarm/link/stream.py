@@ -61,7 +61,8 @@ class StreamOptions:
     asked. `allowances`, one a segment, let the device slow down along the path; without them it cannot. The motors'
     `start_stop_ticks` tell it from which interval on they may stop dead; a device whose drivers are enabled keeps what
     it was told before. `released_spread_usteps` is how far each joint can move by itself while the drivers are
-    released; empty: any way.
+    released; empty: any way. `start_at_s` is a time of the clock at which the first segment is due: START is given the
+    lead that is left until then, at least `lead_ticks`.
     """
 
     lead_ticks: int = 160_000
@@ -69,6 +70,7 @@ class StreamOptions:
     allowances: tuple[Allowance, ...] = ()
     start_stop_ticks: tuple[int, ...] = ()
     released_spread_usteps: tuple[int, ...] = ()
+    start_at_s: float | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -288,8 +290,19 @@ class Stream:
     def _fill(self, now_s: float) -> None:
         self._send_segments(now_s)
         if self._session.idle:  # the queue is full, or the whole plan is in it
-            self._session.send(Start(self._options.lead_ticks), now_s)
+            self._session.send(Start(self._lead_ticks(now_s)), now_s)
             self.phase = Phase.STARTING
+
+    def _lead_ticks(self, now_s: float) -> int:
+        """Return the time from START to the first segment."""
+        start_at_s, least = self._options.start_at_s, self._options.lead_ticks
+        left = least if start_at_s is None else round((start_at_s - now_s) * TICKS_HZ)
+        if left < least:
+            raise LinkError(
+                f"the motion was due to start at {start_at_s:.6f} s, but its segments are in the device only at"
+                f" {now_s:.6f} s, later than {least / TICKS_HZ:g} s before; nothing has moved"
+            )
+        return left
 
     def _begin_running(self, now_s: float) -> None:
         if self._session.idle:

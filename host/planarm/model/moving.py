@@ -1,5 +1,6 @@
 """Obstacles that move: flat arrays for kernels, where each obstacle is, and how near it comes in a span of time."""
 
+from dataclasses import replace
 from math import inf, sqrt
 from typing import NamedTuple
 
@@ -70,6 +71,33 @@ def shape_at(obstacle: Obstacle, time_s: float) -> Circle | Polygon:
     if isinstance(shape, Circle):
         return Circle((shape.center_cm[0] + dx, shape.center_cm[1] + dy), shape.radius_cm)
     return Polygon(tuple((x + dx, y + dy) for x, y in shape.vertices_cm))
+
+
+def later(scene: Scene, by_s: float) -> Scene:
+    """Return the scene as it is after a time: obstacles where they are then, with what is left of their motions."""
+    return replace(scene, obstacles=tuple(_later(obstacle, by_s) for obstacle in scene.obstacles))
+
+
+def _later(obstacle: Obstacle, by_s: float) -> Obstacle:
+    motion, (dx, dy) = obstacle.motion, offset_cm(obstacle.motion, by_s)
+    moved = replace(
+        obstacle,
+        center_cm=None if obstacle.center_cm is None else (obstacle.center_cm[0] + dx, obstacle.center_cm[1] + dy),
+        vertices_cm=None if obstacle.vertices_cm is None else tuple((x + dx, y + dy) for x, y in obstacle.vertices_cm),
+    )
+    if motion is None:
+        return moved
+    begin = by_s % motion.times_s[-1] if motion.repeat else by_s
+    left = [(t, p) for t, p in zip(motion.times_s, motion.offsets_cm, strict=True) if t > begin]
+    if motion.repeat:  # round once more, to where it is now
+        period = motion.times_s[-1]
+        left += [(t + period, p) for t, p in zip(motion.times_s, motion.offsets_cm, strict=True) if 0.0 < t < begin]
+        left.append((begin + period, (dx, dy)))
+    if not left:
+        return replace(moved, motion=None)
+    times = (0.0, *(t - begin for t, _ in left))
+    places = ((0.0, 0.0), *((x - dx, y - dy) for _, (x, y) in left))
+    return replace(moved, motion=ObstacleMotion(times, places, motion.repeat))
 
 
 def sampled_offsets_cm(moving: MovingSet, times_s: Floats) -> Floats:

@@ -35,6 +35,16 @@ class TimedPath:
         length = fsum(dist(a, b) for a, b in pairwise(points.tolist()))
         return cls(np.asarray(cells, np.int64), points, q_rad, length, moving_map.elbow)
 
+    def after(self, q_rad: NDArray[np.float64], tip_cm: NDArray[np.float64]) -> TimedPath:
+        """Return the path with a pose that is no node one sample before it; its cell is that of the first node."""
+        return TimedPath(
+            np.concatenate([self.cells[:1], self.cells]),
+            np.concatenate([[tip_cm], self.points_cm]),
+            np.concatenate([[q_rad], self.q_rad]),
+            self.length_cm + dist(tip_cm.tolist(), self.points_cm[0].tolist()),
+            self.elbow,
+        )
+
     @property
     def arrival(self) -> int:
         """The sample at which the last node is taken."""
