@@ -39,7 +39,7 @@ from planarm.moving_run import KeptTime, Timekeeper, stream_on_time
 from planarm.plan import Findings, Plan
 from planarm.plan_file import StoredPlan
 from planarm.record.outcome import Outcome, Seen, StreamLog
-from planarm.route import find_route
+from planarm.route import Route, find_route
 from planarm.run_folder import begin_run_folder, finish_run_folder
 from planarm.scene import Scene
 from planarm.search.path import Path as TipPath
@@ -87,8 +87,8 @@ LONGEST_MOTION_S = 600.0
 """The certificate looks at a motion every 0.1 ms; beyond ten minutes that takes gigabytes."""
 
 
-def plan_scene(scene: Scene, notice: Notice) -> Plan:
-    """Plan, time, quantise, compress and certify.
+def plan_scene(scene: Scene, notice: Notice, route: Route | None = None) -> Plan:
+    """Plan, time, quantise, compress and certify; a route that is known is not searched.
 
     Raises:
         SceneError: Start or goal cannot be taken.
@@ -100,7 +100,7 @@ def plan_scene(scene: Scene, notice: Notice) -> Plan:
     margin_cm = planning_margin_cm(scene)
     if scene.moving is not None:
         return plan_moving(scene, margin_cm, began_s, notice)
-    route = find_route(scene, margin_cm)
+    route = route or find_route(scene, margin_cm)
     notice("plan", 0.4)
     limits = Limits.of(scene)
     trajectory, path, bound_cm = fastest_motion(route.smooth, limits), route.path, route.bound_cm

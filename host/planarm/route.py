@@ -9,17 +9,17 @@ import numpy as np
 
 from planarm.errors import NoPathError, SceneError
 from planarm.model.arm import Arm
-from planarm.roadmap.planning import RoadmapTask, joint_route_of
+from planarm.roadmap.planning import OBJECTIVES, RoadmapTask, joint_route_of
 from planarm.scene import JointSpaceSpec, Scene
 from planarm.search.costed import JOINT_TRAVEL, Price, time_price
 from planarm.search.diagnosis import Diagnosis, diagnose, diagnose_joints
 from planarm.search.grid_search import find_path
-from planarm.search.joint_space import SIDES, JointRoute, find_joint_route, tip_points_cm
+from planarm.search.joint_space import SIDES, JointRoute, find_joint_route, made_route, tip_points_cm
 from planarm.search.path import Path
 from planarm.search.result import SearchStatus
 from planarm.smoothing.joint_blend import blend_poses
 from planarm.smoothing.smooth import smooth_path
-from planarm.smoothing.smooth_path import SmoothPath
+from planarm.smoothing.smooth_path import Floats, SmoothPath
 from planarm.workspace.check_task import check_task
 from planarm.workspace.free_map import FreeMap, build_free_map
 from planarm.workspace.joint_proof import joint_world
@@ -110,6 +110,12 @@ def roadmap_route(scene: Scene, margin_cm: float, task: RoadmapTask | None = Non
     if answer.status is not SearchStatus.FOUND:
         raise task.no_way(scene)
     return smoothed_joint_route(scene, margin_cm, joint_route_of(scene, task.roadmap, answer), search_s)
+
+
+def route_through(scene: Scene, margin_cm: float, poses_rad: Floats, cost: float) -> Route:
+    """Return the route through configurations of two links, shape (n, 2), joined by free moves that cost `cost`."""
+    found = made_route(scene, poses_rad, OBJECTIVES[scene.roadmap.cost], cost, 0.0)
+    return smoothed_joint_route(scene, margin_cm, found, 0.0)
 
 
 def smoothed_joint_route(scene: Scene, margin_cm: float, found: JointRoute, search_s: float) -> Route:

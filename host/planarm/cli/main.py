@@ -86,6 +86,7 @@ def build_parser() -> argparse.ArgumentParser:
     commands = parser.add_subparsers(dest="command", metavar="COMMAND", required=True)
     _add_plan(commands)
     _add_run(commands)
+    _add_replan(commands)
     _add_stream(commands)
     _add_resume(commands)
     _add_envelope(commands)
@@ -143,6 +144,17 @@ def _add_run(commands: Commands) -> None:
         choices=("page", "terminal"),
         help="watch and steer it: a page on this computer alone, or keys in this terminal",
     )
+    _add_json(command)
+
+
+def _add_replan(commands: Commands) -> None:
+    command = commands.add_parser(
+        "replan", help="carry a scene out and plan again when obstacles appear", epilog=EXIT_CODES
+    )
+    _add_scene(command)
+    _add_port(command)
+    command.add_argument("--arrivals", metavar="FILE", help="[[obstacles]] with at_s, seconds since the motion began")
+    command.add_argument("--watch", metavar="FILE", help="[[obstacles]] that somebody adds to the file meanwhile")
     _add_json(command)
 
 

@@ -7,11 +7,12 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from planarm.dynamics.energy import edge_energy
+from planarm.dynamics.energy import edge_costs, edge_energy
 from planarm.errors import NoPathError, SceneError
 from planarm.model.arm import Arm
 from planarm.model.kinematics import ElbowSide, inverse_2r
-from planarm.roadmap.graph import Roadmap
+from planarm.roadmap.graph import KINDS, Roadmap
+from planarm.roadmap.moves import are_free
 from planarm.scene import EdgeCost, Point, Scene
 from planarm.search.digraph import bound
 from planarm.search.incremental import GraphAlgorithm, GraphAnswer, GraphPlanner
@@ -28,6 +29,11 @@ OBJECTIVES: Final[dict[EdgeCost, str]] = {
     "time": "time from node to node",
     "travel": "joint travel",
 }
+
+MOST_JOINED = 64
+"""Nodes to which a configuration between the nodes is joined, at most."""
+MOST_ASKED = 8
+"""Of these that can be reached, how many are asked for their distance."""
 
 START, GOAL = 0, 1
 """The nodes of a scene's ends."""
@@ -67,9 +73,8 @@ class RoadmapTask:
 
 def joint_route_of(scene: Scene, roadmap: Roadmap, answer: GraphAnswer) -> JointRoute:
     """Return a way of two links on a roadmap as a way in joint space."""
-    poses = roadmap.poses_rad[answer.nodes]
     bounded = bound(roadmap.bounds(), int(answer.nodes[0]), int(answer.nodes[-1]))
-    return made_route(scene, poses, OBJECTIVES[roadmap.cost], answer.cost, bounded)
+    return made_route(scene, roadmap.poses_rad[answer.nodes], OBJECTIVES[roadmap.cost], answer.cost, bounded)
 
 
 def ends_rad(scene: Scene, world: JointWorld) -> tuple[Floats, Floats]:
@@ -108,6 +113,39 @@ def _poses_at(scene: Scene, point_cm: Point) -> list[Floats]:
     low, high = np.array(arm.joint_limits_rad).T
     poses = [inverse_2r(arm, point_cm, side) for side in sides]
     return [pose for pose in poses if np.isfinite(pose).all() and (pose >= low).all() and (pose <= high).all()]
+
+
+def way_from(task: RoadmapTask, world: JointWorld, pose_rad: Floats) -> tuple[Floats, float] | None:
+    """Return the best way to the goal from a configuration that is no node: its poses, and what it costs.
+
+    The configuration is joined with its nearest nodes by free moves, and each of them is asked for its distance, which
+    the search knows or repairs.
+
+    Args:
+        task: the roadmap with all obstacles that were added, and its planner.
+        world: the arm among all obstacles.
+        pose_rad: where the arm rests, shape (n,).
+
+    Returns:
+        None when it is not free, or no free move leads to a node that reaches the goal.
+    """
+    roadmap = task.roadmap
+    if pose_spare_cm(world, pose_rad) <= 0.0:
+        return None
+    levers = np.cumsum(world.lengths_cm[::-1])[::-1]
+    apart = np.linalg.norm((roadmap.poses_rad - pose_rad) * levers, axis=1)
+    near = np.argsort(apart)[:MOST_JOINED]
+    both = np.concatenate([pose_rad[None], roadmap.poses_rad[near]])
+    pairs = np.stack([np.zeros(len(near), np.int64), 1 + np.arange(len(near))], axis=1)
+    free = are_free(world, both, pairs, np.arange(len(near)))
+    best: tuple[float, Floats] | None = None
+    for node in near[free][:MOST_ASKED]:
+        task.planner.move_start(int(node))
+        answer = task.planner.solve()
+        step, _ = edge_costs(roadmap.model, KINDS[roadmap.cost], pose_rad, roadmap.poses_rad[node])
+        if len(answer.nodes) and (best is None or step + answer.cost < best[0]):
+            best = (step + answer.cost, roadmap.poses_rad[answer.nodes])
+    return None if best is None else (np.concatenate([pose_rad[None], best[1]]), best[0])
 
 
 def way_energy_j(roadmap: Roadmap, nodes: NDArray[np.int64]) -> Floats:

@@ -77,6 +77,24 @@ def touched_moves(
 
 
 @kernel
+def first_contact(
+    world: JointWorld, obstacle: ObstacleSet, margin_cm: float, poses_rad: Floats, sway_cm: Floats
+) -> int:
+    """Return the first of poses, shape (m, n), at which a link may be as near as the margin to an obstacle, or -1.
+
+    `sway_cm`, shape (m,), is how far any point of the arm may be from where the pose has it.
+    """
+    ends = np.empty((poses_rad.shape[1] + 1, 2))
+    x, y, radius = obstacle.centers_cm[0, 0], obstacle.centers_cm[0, 1], obstacle.radii_cm[0]
+    for i in range(poses_rad.shape[0]):
+        link_ends(world, poses_rad[i], ends)
+        enough = margin_cm + sway_cm[i]
+        if chain_distance(ends, x, y, radius, obstacle.vertices_cm, enough) <= enough:
+            return i
+    return -1
+
+
+@kernel
 def _is_clear(
     lengths: Floats,
     a: Floats,

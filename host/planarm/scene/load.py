@@ -159,7 +159,7 @@ def scene_from_toml(data: dict[str, object], source: str) -> Scene:
         source=source,
         arm=arm,
         workspace=workspace,
-        obstacles=tuple(_obstacle(source, path, entry, moving) for path, entry in root.tables("obstacles")),
+        obstacles=tuple(parse_obstacle(source, path, entry, moving) for path, entry in root.tables("obstacles")),
         task=parse_task(root.table("task", TASK_KEYS), limits),
         planner=planner,
         joints=_joints(root, links),
@@ -264,7 +264,12 @@ def _workspace(table: Table) -> WorkspaceSpec:
     return workspace
 
 
-def _obstacle(source: str, path: str, data: object, moving: MovingSpec | None) -> Obstacle:
+def parse_obstacle(source: str, path: str, data: object, moving: MovingSpec | None = None) -> Obstacle:
+    """Read one obstacle; `path` names it in errors.
+
+    Raises:
+        SceneError: it is none.
+    """
     entry = Table.with_keys(source, path, data, sorted({*ROUND_KEYS, *POLYGON_KEYS}))
     shape = entry.choice("shape", SHAPES)
     motion = read_obstacle_motion(entry, moving)

@@ -97,6 +97,26 @@ def allowances(trajectory: Trajectory, scene: Scene, durations_ticks: Sequence[i
     )
 
 
+def stops(
+    trajectory: Trajectory, scene: Scene, durations_ticks: Sequence[int], told: Sequence[Allowance], share: float
+) -> tuple[Floats, Floats]:
+    """Return where each slice of a motion starts and the path time that a stop takes from there, in seconds.
+
+    Args:
+        trajectory: as planned.
+        scene: the arm.
+        durations_ticks: of the segments.
+        told: their allowances.
+        share: of the allowed slowing that the stop uses: 1 for a quick one, one half for a stop or a hold.
+    """
+    slices = Slices.of(durations_ticks)
+    starts_s = slices.starts / TICKS_HZ
+    slow = np.array([allowance.slow_per_s for allowance in told])
+    rates = share * ROUNDED_DOWN * least_of_neighbours(slow)[slices.segment]
+    over = _over_start_stop(trajectory, scene, starts_s)
+    return starts_s, path_time_to_rest(slices.durations / TICKS_HZ, rates, over)
+
+
 def _times(trajectory: Trajectory, starts_s: Floats) -> Floats:
     """Return times at which to look, sorted: borders and gridpoints from both sides, and INNER in each slice."""
     inner = starts_s[:-1, None] + np.diff(starts_s)[:, None] * (np.arange(1, INNER + 1) / (INNER + 1))
