@@ -44,13 +44,14 @@ def fit_run(low: Ticks, high: Ticks, least_interval: int) -> Fit:
     if steps < 3:
         # Any interval between the steps' windows; with one step, none.
         apart = max(least_interval, (low[-1] + high[-1] - low[0] - high[0]) // 2) if steps == 2 else 0
-        return placed(low, high, least_interval, apart * ONE_Q16, 0)
+        return placed(low, high, least_interval, apart * ONE_Q16, int(np.int64(0)))
     inside, interval, add = fitted(low, high)
+    slower, faster = int(np.int64(1)), int(np.int64(-1))  # no literals: `fitted_held` would be compiled for each
     last = interval + (steps - 2) * add
     if inside and min(interval, last) < least_interval * ONE_Q16:
-        inside, interval, add = fitted_held(low, high, least_interval, last < interval, 1)
+        inside, interval, add = fitted_held(low, high, least_interval, last < interval, slower)
     elif inside and max(interval, last) > MAX_INTERVAL_TICKS * ONE_Q16:
-        inside, interval, add = fitted_held(low, high, MAX_INTERVAL_TICKS, last > interval, -1)
+        inside, interval, add = fitted_held(low, high, int(np.int64(MAX_INTERVAL_TICKS)), last > interval, faster)
     return placed(low, high, least_interval, interval, add) if inside else (False, 0, 0, 0)
 
 

@@ -46,7 +46,8 @@ def cut(windows: Windows, fast_ticks: int, duration_ticks: int) -> tuple[Ticks, 
     joints = windows.least_interval.shape[0]
     following, last = windows.first[:-1].copy(), np.full(joints, NEVER)
     ends, runs = np.zeros(64, np.int64), np.zeros((64, joints, 4), np.int64)
-    segments, begin, length = 0, 0, 1
+    # No literals go into the other kernels: each would be compiled a second time for them.
+    segments, begin, length = 0, int(np.int64(0)), int(np.int64(1))
     while 0 <= begin < duration_ticks:
         if segments == ends.shape[0]:
             ends, runs = np.concatenate((ends, ends)), np.concatenate((runs, runs))
