@@ -17,29 +17,34 @@ from planarm.scene import load_scene
 DOCS = Path(__file__).resolve().parent
 CASE1 = DOCS.parent / "examples" / "table1_case1.toml"
 STALL = DOCS.parent / "tests" / "scenarios" / "mechanics_stall.toml"
-SHOWN = {"report_case1": (None, "light", 1.1), "report_stall_dark": (STALL, "dark", 1.3)}
-"""For each picture: what goes wrong, the look, and the moment that is shown, in seconds."""
+MOVING = DOCS.parent / "examples" / "moving_env1.toml"
+SHOWN = {
+    "report_case1": (CASE1, None, "light", 1.1),
+    "report_stall_dark": (CASE1, STALL, "dark", 1.3),
+    "report_moving": (MOVING, None, "light", 9.0),
+}
+"""For each picture: the scene, what goes wrong, the look, and the moment that is shown, in seconds."""
 
 
 def make_screenshots(folder: Path) -> list[Path]:
-    """Run case 1 with each schedule of faults, open its report, and take what a desktop shows; return the files."""
+    """Run each scene, open its report, and take what a desktop shows; return the files."""
     made = []
     with sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=shutil.which("chromium"), args=["--no-sandbox"])
-        for name, (faults, scheme, moment_s) in SHOWN.items():
+        for name, (scene, faults, scheme, moment_s) in SHOWN.items():
             with tempfile.TemporaryDirectory() as out:
                 page = browser.new_page(viewport={"width": 1440, "height": 1200}, color_scheme=scheme)
-                page.goto(f"{_report(Path(out), faults).as_uri()}#t={moment_s}")
+                page.goto(f"{_report(Path(out), scene, faults).as_uri()}#t={moment_s}")
                 made.append(folder / f"{name}.png")
                 page.screenshot(path=made[-1])
         browser.close()
     return made
 
 
-def _report(out: Path, faults: Path | None) -> Path:
-    """Run case 1 and return its report; a run that goes wrong as wanted has one, too."""
+def _report(out: Path, scene: Path, faults: Path | None) -> Path:
+    """Run a scene and return its report; a run that goes wrong as wanted has one, too."""
     try:
-        run_scene(load_scene(CASE1), "sim://", out, lambda _stage, _share: None, faults=faults)
+        run_scene(load_scene(scene), "sim://", out, lambda _stage, _share: None, faults=faults)
     except PlanarmError:
         if faults is None:  # else it was asked to go wrong, and the report says how
             raise

@@ -145,7 +145,8 @@ class Workspace {
     const area = (code) => swatch(s("rect", { class: `region r${code}`, width: 20, height: 12, rx: 2, stroke: "var(--line)" }),
       code === 3 ? s("path", { d: "M2 12L12 0M9 12L19 0", style: "stroke:var(--blocked-mark);stroke-width:1.6" }) : null);
     const line = (name) => swatch(s("path", { class: name, d: "M1 6H19", style: "stroke-width:3" }));
-    const items = map.names.flatMap((name, code) => (code && map.runs[code].length ? [[area(code), name]] : []));
+    const when = this.movers.length ? " at time 0" : "";
+    const items = map.names.flatMap((name, code) => (code && map.runs[code].length ? [[area(code), code === 3 ? name + when : name]] : []));
     items.unshift([line("links"), "arm as planned"], [line("way c1"), "path of the tip"]);
     if (real) items.splice(1, 0, [line("links real"), "arm as it was"]);
     items.push([swatch(s("circle", { class: "end", cx: 10, cy: 6, r: 4.2 })), "start"]);
