@@ -149,11 +149,12 @@ def zones_scene(nodes: int, seed: int = 1) -> Scene:
     return arm_scene("no enter zones", (20.0, 16.0, 12.0), triangles, ends, nodes, seed=seed, cost="consumed")
 
 
-def bench_scene(nodes: int, cost: EdgeCost = "consumed", seed: int = 1) -> Scene:
-    """Return two links among four obstacles, with room to pass them on several sides."""
+def bench_scene(nodes: int, cost: EdgeCost = "consumed", seed: int = 1, *, links: int = 2) -> Scene:
+    """Return two or three links of 50 cm among four obstacles, with room to pass them on several sides."""
     obstacles = circle(30, 22, 7) + circle(-22, 34, 6) + circle(-36, -18, 7) + circle(16, -38, 6)
-    ends = ((0.0, 60.0), (160.0, 30.0))
-    return arm_scene("bench", (30.0, 20.0), obstacles, ends, nodes, seed=seed, cost=cost, sampling="halton")
+    lengths = (30.0, 20.0) if links == 2 else (20.0, 17.0, 13.0)
+    ends = ((0.0, 60.0, 0.0)[:links], (160.0, 30.0, 0.0)[:links])
+    return arm_scene("bench", lengths, obstacles, ends, nodes, seed=seed, cost=cost, sampling="halton")
 
 
 def random_scene(seed: int, links: int, nodes: int, cost: EdgeCost) -> Scene:
