@@ -106,12 +106,13 @@ def test_all_equal_dijkstra_after_every_change_of_random_graphs(sized):
             answers += 1
             if rng.random() < 0.6 and len(found[-1].nodes) > 1:
                 start = int(found[-1].nodes[rng.randrange(len(found[-1].nodes))])
-            elif rng.random() < 0.3:
+            elif rng.random() < 0.5:
                 start = rng.randrange(made.count)
-            edited = made.edit()
+            edited = made.edit() if rng.random() < 0.7 else None  # or the start has moved, and nothing else
             for planner in planners:
                 planner.move_start(start)
-                planner.change(edited)
+                if edited is not None:
+                    planner.change(edited)
     assert answers == sized(40, 2000) * 8
 
 

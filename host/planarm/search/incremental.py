@@ -163,6 +163,7 @@ class GraphPlanner:
             nodes, read_off = stored_path(self._state)
         else:
             nodes, read_off = gradient_path(self._graph, self._state)
+        assert not len(nodes) or nodes[-1] == self._state.ends[GOAL], "every node on the way stores a successor"
         expanded, updated, looked, rescanned = (int(counted[k]) for k in (EXPANDED, UPDATED, LOOKED, RESCANNED))
         status = SearchStatus.FOUND if len(nodes) else SearchStatus.NO_PATH
         return GraphAnswer(status, nodes, cost, Work(expanded, updated, looked, rescanned, read_off), anew)

@@ -88,6 +88,7 @@ def repair(graph: Digraph, bounds: Bounds, state: Lifelong) -> int:
     """Expand nodes until the start's distance is right; return DONE, or the node whose incoming costs are needed."""
     g, rhs, heap = state.g, state.rhs, state.heap
     start = state.ends[START]
+    _follow_start(bounds, state)
     if state.stale[start]:
         _compare_all(graph, state, start)
         _update(bounds, state, start)
@@ -124,8 +125,7 @@ def repair(graph: Digraph, bounds: Bounds, state: Lifelong) -> int:
 def change(graph: Digraph, bounds: Bounds, state: Lifelong, edges: Ints, costs: Floats) -> None:
     """Give edges new costs, both of shape (k,), and put the nodes that are concerned into the open list."""
     ends, g, rhs = state.ends, state.g, state.rhs
-    state.key_modifier[0] += bound(bounds, ends[LAST], ends[START])
-    ends[LAST] = ends[START]
+    _follow_start(bounds, state)
     for k in range(edges.shape[0]):
         e, new = edges[k], costs[k]
         u, v, old = graph.tail[e], graph.head[e], graph.cost[e]
@@ -138,6 +138,13 @@ def change(graph: Digraph, bounds: Bounds, state: Lifelong, edges: Ints, costs: 
         elif new + g[v] < rhs[u]:
             rhs[u], state.best[u] = new + g[v], v
             _update(bounds, state, u)
+
+
+@kernel
+def _follow_start(bounds: Bounds, state: Lifelong) -> None:
+    """Let k_m grow by what the start has moved: keys made before stay lower bounds of what they would be now."""
+    state.key_modifier[0] += bound(bounds, state.ends[LAST], state.ends[START])
+    state.ends[LAST] = state.ends[START]
 
 
 @kernel
