@@ -13,6 +13,7 @@ from planarm.errors import UsageError
 from planarm.model.arm import Arm
 from planarm.model.kinematics import forward
 from planarm.model.shapes import shape_of
+from planarm.moving_picture import animate
 from planarm.output import writing
 from planarm.plan_file import StoredPlan, save_plan
 from planarm.record.run_record import FORMAT, run_record
@@ -57,6 +58,8 @@ def finish_run_folder(out: Path, outcome: Outcome) -> None:
         (out / RECORD).write_text(json.dumps(record, separators=(",", ":")) + "\n", encoding="utf-8")
         (out / PAGE).write_text(run_page(record), encoding="utf-8")
         _draw(plan, *(out / name for name in ("workspace.png", "joint_angles.png", "step_rates.png")))
+        if plan.moving is not None:
+            animate(out / "animation.svg", plan)
         if seen.pins is not None:
             seen.pins.write_vcd(out / "trace.vcd")
         if seen.arm is not None:
@@ -131,6 +134,11 @@ def _draw(plan: Plan, workspace: Path, joint_angles: Path, step_rates: Path) -> 
 def _search_words(plan: Plan) -> str:
     """Say how the path was found."""
     planner, joint = plan.scene.planner, plan.joint
+    if plan.moving is not None:
+        path = plan.moving.path
+        return (
+            f"space and time, {path.arrival} samples of {plan.moving.moving_map.clock.sample_s:g} s, obstacles at 0 s"
+        )
     if joint is None:
         return f"{planner.algorithm} ({planner.neighbours})"
     changes = len(joint.changes_cm)

@@ -51,7 +51,7 @@ def planned_figures(plan: Plan) -> dict[str, Any]:
         "neighbours": scene.planner.neighbours,
         "seed": scene.planner.seed,
         "moves": scene.planner.moves,
-        "space": "tip" if plan.joint is None else "joint",
+        "space": "time" if plan.moving else "tip" if plan.joint is None else "joint",
         "elbow_changes": 0 if plan.joint is None else len(plan.joint.changes_cm),
         **plan.length_figures(),
         "search_ms": round(plan.search_ms, 3),
@@ -76,6 +76,8 @@ def _moving_figures(plan: Plan) -> dict[str, Any]:
     if route is None:
         return {}
     return {
+        "planner": "space_time",
+        "neighbours": 8,
         "sample_s": route.moving_map.clock.sample_s,
         "arrival_sample": route.path.arrival,
         "waits": len(route.path.waits),

@@ -215,10 +215,12 @@ ALLOWED: dict[str, set[str]] = {
         "planarm.workspace",
         "planarm_wire",
     },
+    "planarm.moving_picture": {"planarm.model", "planarm.plan", "planarm.report"},
     "planarm.run_folder": {
         "planarm.errors",
         "planarm.record",
         "planarm.model",
+        "planarm.moving_picture",
         "planarm.report",
         "planarm.output",
         "planarm.plan",

@@ -93,6 +93,6 @@ def test_on_random_scenes_no_executed_plan_touches_anything(sized):
     plain, modified, exact = result.tallies
     assert plain.outcomes.get("contact", 0) + modified.outcomes.get("contact", 0) > 0
     assert "contact" not in exact.outcomes
-    assert min((*plain.late_samples, *modified.late_samples), default=0) >= 0
+    assert len(plain.late_samples) <= plain.outcomes["reached"]
     assert sum(plain.outcomes.values()) == sum(exact.outcomes.values()) == result.scenes
     assert str(result.executed) in random_tables(result)[0].rows[2][1]

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass, replace
 from types import SimpleNamespace
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
@@ -16,9 +17,11 @@ from planarm.model.arm import Arm
 from planarm.model.kinematics import forward, inverse_2r
 from planarm.model.moving import later, shape_at
 from planarm.model.transmission import Transmission
+from planarm.moving_picture import animate
 from planarm.moving_route import find_moving_route, rest_problem
 from planarm.moving_run import FIRST_LEAD_S, REACTION_S, REPLAN_S, Timekeeper, most_late_s, stream_on_time
 from planarm.scene import Obstacle, ObstacleMotion
+from planarm.trajectory.motion import Trajectory
 
 
 @dataclass
@@ -203,3 +206,20 @@ def test_a_pose_that_nothing_comes_near_has_no_problem():
     q = inverse_2r(Arm.from_spec(scene.arm), (25.0, 3.0), "up")
     resting = replace(scene, task=replace(scene.task, start_rad=tuple(map(float, q))))
     assert rest_problem(resting, 5.0) == ""
+
+
+def test_a_plan_is_animated_with_its_obstacles_in_real_time(tmp_path):
+    scene, route = scene_and_route()
+    trajectory = Trajectory.in_own_time(route.spline)
+    plan = SimpleNamespace(
+        scene=scene, moving=route, trajectory=trajectory, path=SimpleNamespace(length_cm=route.length_cm)
+    )
+    animate(tmp_path / "a.svg", plan)
+    svg = ElementTree.parse(tmp_path / "a.svg").getroot()
+    animations = list(svg.iter("{http://www.w3.org/2000/svg}animate"))
+    arm = next(a for a in animations if a.get("attributeName") == "points")
+    assert float(arm.get("dur").rstrip("s")) == pytest.approx(trajectory.duration_s)
+    last = arm.get("values").split(";")[-1].split()[-1]
+    assert tuple(map(float, last.split(","))) == pytest.approx(scene.task.goal_cm, abs=0.01)
+    shifts = [a.get("values") for a in svg.iter("{http://www.w3.org/2000/svg}animateTransform")]
+    assert len(shifts) <= len(scene.obstacles)

@@ -2,6 +2,7 @@
 
 import heapq
 from dataclasses import replace
+from itertools import pairwise
 from math import dist, inf, sqrt
 
 import numpy as np
@@ -9,10 +10,12 @@ import pytest
 
 from host_scenes import make_scene
 from moving_scenes import QUARTER, SAMPLE_S, clearance_at, random_moving_scene, replace_moving
+from planarm.experiments.moving_random import random_scene
 from planarm.scene import MovingSpec, Obstacle, ObstacleMotion
+from planarm.search.moving.bits import move_planes
 from planarm.search.moving.dstar import run_plain
 from planarm.search.moving.rules import first_contact, run_rule
-from planarm.search.moving.space_time import MovingStatus, hold_sample, search_space_time, world_of
+from planarm.search.moving.space_time import MovingStatus, forward, hold_sample, search_space_time, world_of
 from planarm.search.moving.timed_path import TimedPath
 from planarm.workspace.cell_poses import DX, DY
 from planarm.workspace.moving_map import build_moving_map, unpacked
@@ -102,6 +105,32 @@ def test_every_edge_of_a_path_keeps_clear_between_samples_and_for_the_delay(size
         for later in np.arange(result.path.arrival, scene.moving.samples, 0.7):
             assert clearance_at(scene, q[-1], later * SAMPLE_S) > scene.margin_cm, f"seed {seed}"
     assert looked > 0
+
+
+def promised_arrival(moving, start, goal):
+    """The arrival that the nodes alone promise: moves between free nodes, waits where the map has them proved."""
+    reach = np.zeros(moving.free.shape, np.uint64)
+    iy, ix = divmod(start, moving.poses.columns)
+    reach[0, iy, ix // 64] = np.uint64(1) << np.uint64(ix % 64)
+    at_goal = divmod(goal, moving.poses.columns)
+    planes = moving.free, moving.stay, moving.room, move_planes(moving.poses)
+    return forward(*planes, reach, *at_goal, max(0, hold_sample(moving, goal)), False)
+
+
+@pytest.mark.parametrize("draw", [(1, 261), (1, 3)])
+def test_every_path_is_made_of_proved_edges_also_where_the_nodes_promise_an_earlier_arrival(draw):
+    """Of 500 random scenes the 261st is one in which the edges between nodes' promise and proof decide."""
+    scene, side = random_scene(np.random.default_rng(draw))
+    moving = build_moving_map(scene, side)
+    start, goal = task_of(scene, moving)
+    result = search_space_time(moving, start, goal)
+    assert result.path is not None
+    places = moving.poses.place[result.path.cells].tolist()
+    for k, (a, b) in enumerate(pairwise(places)):
+        assert b in dict(edges_from(moving, a, k)), f"sample {k}"
+    assert (result.path.cells[0], result.path.cells[-1]) == (start, goal)
+    if draw == (1, 261):
+        assert promised_arrival(moving, start, goal) < result.path.arrival
 
 
 def crossing_scene(width_cm, samples=16):

@@ -155,10 +155,13 @@ def _solve(case: _Case, start: int) -> tuple[NDArray[np.int64] | None, int, int]
         arrival, proofs = forward_proving(case.world, case.poses, *planes, case.goal, case.hold, limit, *case.times_s)
         if arrival < 0:
             return None, proofs, -1
+        if arrival > soonest:  # the sets end where their search did
+            forward(free, stay, room, moves, possible, *case.at_goal, arrival, False)
     useful = np.zeros((arrival + 1, *free.shape[1:]), np.uint64)
     backward(free, stay, moves, useful, *case.at_goal, arrival, arrival)
     useful &= possible[: arrival + 1]
     cells, more = shortest(case.world, case.poses, stay, room, useful, start, case.goal, *case.times_s)
+    assert len(cells), "an arrival by proved edges has a path of them"
     return cells, proofs + more, -1
 
 
@@ -325,7 +328,9 @@ def shortest(
                 costs[d] = np.inf
         later, here = here, later
     cells = np.empty(arrival + 1, np.int64)
-    cells[0] = start
+    cells[0] = start if later[poses.place[start]] < np.inf else -1
+    if cells[0] < 0:
+        return cells[:0], proofs
     for k in range(arrival):
         d = choice[k, poses.place[cells[k]]]
         cells[k + 1] = cells[k] if d == WAIT else cells[k] + DY[d] * columns + DX[d]
