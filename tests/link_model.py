@@ -214,6 +214,8 @@ class Device:
                     self._drop_queue(State.READY)
             case Override():
                 self.override_percent = message.percent
+                if self.state is State.RUNNING:
+                    self._await_segment_end()
             case Start() if self.state is State.READY and self.queue:
                 self.state = State.RUNNING
                 self.segment_start_s = self.events.now_s + message.lead_ticks / TICKS_HZ
@@ -247,7 +249,7 @@ class Device:
     # -- executing ----------------------------------------------------------------------------------------------------
 
     def _segment_end_s(self) -> float:
-        return self.segment_start_s + duration_ticks(self.queue[0]) / TICKS_HZ
+        return self.segment_start_s + duration_ticks(self.queue[0]) / TICKS_HZ * 100 / self.override_percent
 
     def _await_segment_end(self) -> None:
         end_s = self._segment_end_s()
@@ -299,7 +301,7 @@ class Device:
         position = list(self.position)
         if self.state in (State.RUNNING, State.HELD) and self.queue:
             now_s = self.held_s if self.state is State.HELD else self.events.now_s
-            elapsed_ticks = (now_s - self.segment_start_s) * TICKS_HZ
+            elapsed_ticks = (now_s - self.segment_start_s) * TICKS_HZ * self.override_percent / 100
             for joint, move in enumerate(self.queue[0].moves):
                 position[joint] += direction(move) * sum(tick <= elapsed_ticks for tick in step_ticks(move))
         return Ledger(self.executed, tuple(position))

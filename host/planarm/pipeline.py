@@ -30,6 +30,7 @@ from planarm.gentle import ROOM_CM, gentle_motion, jerk_limits
 from planarm.link.arm_record import ArmSetup, ArmTrace
 from planarm.link.clock import Clock
 from planarm.link.exchange import StreamResult
+from planarm.link.positions import Positions, default_path
 from planarm.link.stream import Stream, StreamProgress
 from planarm.link.transport import PinTrace, Transport, open_transport
 from planarm.model.arm import Arm
@@ -43,6 +44,7 @@ from planarm.route import Route, find_route
 from planarm.run_folder import begin_run_folder, finish_run_folder
 from planarm.scene import Scene
 from planarm.search.path import Path as TipPath
+from planarm.standing import settle_start
 from planarm.stepping.certify import certify
 from planarm.stepping.quantise import quantisation_bound_cm
 from planarm.stepping.schedule import encode, schedule
@@ -230,6 +232,9 @@ def run_scene(
     faults: Path | None = None,
     fault_seed: int | None = None,
     onlooker: Onlooker | None = None,
+    watch: Callable[[StreamProgress], None] | None = None,
+    warn: Callable[[str], None] | None = None,
+    at_start: bool = False,
 ) -> dict[str, Any]:
     """Plan, stream, verify and report; return the summary.
 
@@ -241,6 +246,9 @@ def run_scene(
         faults: a schedule of what goes wrong around an emulated board (docs/faults.md).
         fault_seed: in place of the schedule's own.
         onlooker: watches and steers the run while it goes on.
+        watch: told all that the device tells.
+        warn: told what will be otherwise than planned, before it begins.
+        at_start: somebody says that the arm stands where the plan begins.
 
     Raises:
         PlanarmError: the branch of the tree tells which stage failed. Differing steps are reported first, then raised.
@@ -250,14 +258,16 @@ def run_scene(
     begin_run_folder(out, stored(plan))
     setup = ArmSetup(scene, plan.segments.start_usteps, faults, fault_seed)
     with closing(open_transport(port, scene.link.baud, setup)) as transport:
-        log = StreamLog(transport.clock.now_s)
         recorded = record(transport, out, port, scene)
-        watch, steer = [log.note], None
+        positions = Positions(default_path())
+        settle_start(recorded, port, scene, plan.segments.start_usteps, positions, vouched=at_start)
+        log = StreamLog(transport.clock.now_s)
+        watchers, steer = [log.note, *([watch] if watch else [])], None
         if onlooker is not None:
             onlooker.begin(plan, transport.clock, emulated=transport.pins is not None)
-            watch, steer = [log.note, onlooker.note], onlooker.steer
+            watchers, steer = [*watchers, onlooker.note], onlooker.steer
         try:
-            plan, streamed, kept = carry_out(plan, recorded, notice, watch, steer)
+            plan, streamed, kept = carry_out(plan, recorded, notice, watchers, steer, warn)
         except (LinkError, DeviceFault, HostKilledError, CertificateError, StepsDifferError) as error:
             seen = look_at(plan, transport, SETTLE_AFTER_FAILURE_S)
             for line in seen.notes() if log.samples else ():
@@ -281,6 +291,7 @@ def carry_out(
     notice: Notice,
     watch: Sequence[Callable[[StreamProgress], None]],
     steer: Callable[[Stream], None] | None,
+    warn: Callable[[str], None] | None = None,
 ) -> tuple[Plan, StreamResult, KeptTime | None]:
     """Stream a plan; one among moving obstacles by its clock, planned again where it falls behind.
 
@@ -290,7 +301,7 @@ def carry_out(
     if plan.moving is None:
         options = options_for(plan.scene, plan.segments)
         tell = telling(notice, *watch)
-        return plan, stream(plan.segments, plan.certificate, transport, tell, options, steer=steer), None
+        return plan, stream(plan.segments, plan.certificate, transport, tell, options, steer=steer, warn=warn), None
 
     def on_time(now: Plan, keeper: Timekeeper) -> StreamResult:
         def steered(running: Stream) -> None:

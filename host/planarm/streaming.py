@@ -57,6 +57,7 @@ def stream(
     options: StreamOptions | None = None,
     joining: Joining | None = None,
     steer: Callable[[Stream], None] | None = None,
+    warn: Callable[[str], None] | None = None,
 ) -> StreamResult:
     """Stream a certified plan and wait until it is executed; `steer` may hold, resume and stop it meanwhile.
 
@@ -69,4 +70,4 @@ def stream(
     if not certificate.ok:
         raise CertificateError(certificate.explain())
     options = options or StreamOptions(allowances=plan.allowances)
-    return stream_plan(transport, plan.segments, on_progress, options, joining=joining, steer=steer)
+    return stream_plan(transport, plan.segments, on_progress, options, joining=joining, steer=steer, warn=warn)

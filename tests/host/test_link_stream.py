@@ -1,5 +1,6 @@
 """Streaming against a model of the device, on good lines and bad ones, in virtual time."""
 
+import re
 from dataclasses import replace
 from itertools import accumulate
 
@@ -10,10 +11,12 @@ from hypothesis import strategies as st
 from link_model import USB_FLUSH_S, Damage, ModelLine, motion
 from planarm.errors import CertificateError, DeviceFault, LinkError, StepsDifferError
 from planarm.link.exchange import open_session, request, stream_plan
+from planarm.link.margin import Margin, line_margin
 from planarm.link.plan_steps import planned_usteps
 from planarm.link.position import Certainty, StreamError, StreamFault
+from planarm.link.remaining import Remaining, words_of
 from planarm.link.session import SessionLimits
-from planarm.link.stream import StreamOptions
+from planarm.link.stream import StreamOptions, StreamProgress
 from planarm_wire.codec import decode, encoded_bytes
 from planarm_wire.framing import Frame, FrameDecoder, encode_frame
 from planarm_wire.messages import (
@@ -59,7 +62,8 @@ def test_a_plan_is_executed_once_in_order_and_checked(count, to_host):
     assert tuple(line.device.position) == planned_usteps(plan) == result.ledger_after.position_usteps
     assert line.device.state is State.READY  # enabled: a loaded arm must not fall
     assert result.crc_errors == result.bytes_lost == result.damaged_replies == 0
-    assert result.motion_s == pytest.approx(count * 0.002, abs=0.02)
+    assert result.path_clock_percent >= (100 if to_host is HARMLESS else 75)
+    assert result.motion_s == pytest.approx(count * 0.2 / result.path_clock_percent, abs=0.02)
 
 
 def test_two_plans_follow_one_another_without_letting_go_of_the_arm():
@@ -373,9 +377,17 @@ def test_a_fault_in_a_motion_is_told_with_the_exact_position(fault):
     assert caught.value.position.moved_usteps == tuple(line.device.position)
 
 
-def test_a_line_that_cannot_carry_the_plan_ends_in_an_underrun_with_the_exact_position():
+def test_a_line_that_cannot_carry_the_plan_carries_it_slowly():
     """800 ticks is 20,000 segments a second; 25,000 bytes a second do not carry them."""
     line, plan = ModelLine(), motion(300, ticks=1600)
+    result = stream_plan(line, plan)
+    assert tuple(line.device.segments_executed) == plan
+    assert result.path_clock_percent < 20
+
+
+def test_a_line_that_gets_too_slow_in_a_motion_ends_in_an_underrun_with_the_exact_position():
+    line, plan = ModelLine(), motion(300, ticks=20_000)
+    after(line, 0.15, lambda: setattr(line.to_device, "delay_s", 0.1))
     with pytest.raises(StreamFault, match=r"ran empty.*raise the baud rate.*position exact"):
         stream_plan(line, plan)
     executed = tuple(line.device.segments_executed)
@@ -443,3 +455,86 @@ def test_asking_is_not_moving():
     session = open_session(line)
     assert request(line, session, Query()).state is State.IDLE
     assert line.device.segments_executed == []
+
+
+# -- a line that is too slow ------------------------------------------------------------------------------------------
+
+
+def test_a_line_too_slow_for_the_plan_slows_the_motion_and_says_so_before_it_starts():
+    """40 ms there and back let 112 bytes pass: 2,800 a second, which is less than this plan asks for."""
+    line, plan, said = ModelLine(Damage(delay_s=0.02), Damage(delay_s=0.02)), motion(300, ticks=64_000), []
+
+    def warn(text):
+        assert MessageType.START not in [frame.type_code for frame in frames_written(line)]
+        said.append(text)
+
+    result = stream_plan(line, plan, warn=warn)
+    assert re.fullmatch(
+        r"the line was seen to carry \d+ bytes/s, the plan asks for \d+ and some to spare: the motion runs at"
+        r" \d+ % of its speed and takes \d+\.\d s instead of 1\.2 s",
+        said[0],
+    )
+    assert len(said) == 1
+    assert 5 < result.path_clock_percent < 60
+    assert line.device.override_percent == result.path_clock_percent
+    assert tuple(line.device.segments_executed) == plan
+
+
+def test_a_good_line_changes_nothing_and_takes_an_earlier_override_back():
+    line, said = ModelLine(), []
+    line.device.override_percent = 30
+    result = stream_plan(line, motion(300, ticks=64_000), warn=said.append)
+    assert (said, result.path_clock_percent, line.device.override_percent) == ([], 100, 100)
+
+
+def test_what_a_plan_asks_of_the_line_is_what_has_to_arrive_in_time():
+    plan = motion(300, ticks=64_000)
+    result = stream_plan(ModelLine(), plan)
+    whole = line_margin(plan, 40, 1000, 0.1)
+    assert whole.seen == pytest.approx(10_000.0)
+    assert whole.asked < result.bytes_sent / result.motion_s, "what the queue holds need not be sent in time"
+    busy = line_margin((*motion(100, ticks=320_000)[:-1], *motion(300, ticks=20_000)), 40, 1000, 0.1)
+    assert busy.asked > line_margin(motion(400, ticks=320_000), 40, 1000, 0.1).asked
+    assert line_margin(plan, 300, 1000, 0.1).percent == 100, "all of it is in the queue"
+    assert line_margin(plan, 40, 299, 10.0).percent == 100, "too little was seen"
+    assert Margin(1000.0, 500.0, 1.0).percent == 45
+    assert Margin(1e9, 500.0, 1.0).percent == 1
+
+
+# -- the hand on a running stream -------------------------------------------------------------------------------------
+
+
+def test_a_running_stream_is_steered():
+    line, plan, done = ModelLine(), motion(300), []
+
+    def steer(stream):
+        if stream.executed_segments > 50 and not done:
+            stream.hold()
+            done.append(line.now_s())
+        if len(done) == 1 and line.now_s() > done[0] + 0.3:
+            stream.resume()
+            done.append(line.now_s())
+
+    result = stream_plan(line, plan, steer=steer)
+    assert tuple(line.device.segments_executed) == plan
+    assert line.device.holds == 1
+    assert result.motion_s > 0.3 + 300 * 0.002
+
+
+# -- the remaining time -----------------------------------------------------------------------------------------------
+
+
+def test_the_remaining_time_is_the_walls_and_honest():
+    line, told = ModelLine(), []
+    remaining = Remaining(lambda: 3.0 * line.now_s())  # a line whose clock runs three times as slow as the wall's
+    stream_plan(line, motion(1000), lambda progress: told.append((line.now_s(), remaining.after(progress))))
+    end_s = told[-1][0]
+    late = [(at_s, left_s) for at_s, left_s in told if at_s > 0.5]
+    for at_s, left_s in late:
+        assert left_s == pytest.approx(3.0 * (end_s - at_s), abs=0.2)
+    progress = StreamProgress(1.0, 2.0, 5, 10, 5, (0, 0), State.HELD, 1.0, 800, 0, 0)
+    assert remaining.after(progress) is None
+    assert words_of(progress, None) == "1.00 of 2.00 s, 5 segments queued, the arm stands (held)"
+    slow = replace(progress, state=State.RUNNING, rate_percent=50)
+    assert remaining.after(slow) > 1.9
+    assert words_of(slow, 2.0) == "1.00 of 2.00 s, 5 segments queued, at 50 %, about 2.0 s left"

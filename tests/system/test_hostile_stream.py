@@ -117,3 +117,52 @@ def test_the_same_motion_undamaged_does_move():
     board.send(wire.Start(wire.MIN_LEAD_TICKS))
     board.uno.run(seconds=0.1)
     assert [int((board.uno.edges(pin)["level"] == 1).sum()) for pin in wire.STEP_PINS] == [40, 40]
+
+
+FRAMES_A_ROUND = 250
+
+
+def mutated(frame, dice):
+    """Return a frame with one to three bytes changed, left out, put in or doubled."""
+    data = bytearray(frame)
+    for _ in range(dice.randint(1, 3)):
+        at = dice.randrange(len(data))
+        match dice.randrange(4):
+            case 0:
+                data[at] ^= 1 << dice.randrange(8)
+            case 1:
+                del data[at]
+            case 2:
+                data.insert(at, dice.randrange(256))
+            case _:
+                data.insert(at, data[at])
+        if not data:
+            break
+    return bytes(data) + bytes([wire.DELIMITER])
+
+
+def mutants(frames, count, dice):
+    """Return mutated frames, one after the other, of which the reference receiver takes none."""
+    sent = b""
+    while count:
+        one = mutated(dice.choice(frames), dice)
+        if not any(isinstance(found, Frame) for found in FrameDecoder().feed(one)):
+            sent += one
+            count -= 1
+    return sent
+
+
+def test_mutated_frames_move_no_pin_and_the_next_good_one_is_answered(sized):
+    """All are near misses of ENABLE, SEGMENTS and START in the state in which START would move the arm."""
+    board = Board()
+    loaded(board)
+    status = board.send(wire.Query())[-1]
+    for seed in range(sized(8, 1_000_000 // FRAMES_A_ROUND)):
+        board.uno.serial.write(mutants(frames_to_damage(board), FRAMES_A_ROUND, random.Random(seed)))
+        board.replies()
+        answered = board.send(wire.Query())
+        assert answered, f"seed {seed}"
+        told = answered[-1]
+        assert (told.state, told.fault) == (wire.State.READY, wire.Fault.NONE), f"seed {seed}"
+        assert (told.free_bytes, told.ledger) == (status.free_bytes, status.ledger), f"seed {seed}"
+        assert board.moving_edges() == 0, f"seed {seed}"

@@ -32,7 +32,16 @@ def test_run_streams_through_a_pty_to_the_emulator(tmp_path):
         assert first_line.startswith("/dev/"), first_line
         assert link.resolve() == Path(first_line.strip())
         ran = subprocess.run(
-            command("run", str(ROOT / "examples/table1_case1.toml"), "--port", str(link), "--json", "--out", "out"),
+            command(
+                "run",
+                str(ROOT / "examples/table1_case1.toml"),
+                "--port",
+                str(link),
+                "--at-start",
+                "--json",
+                "--out",
+                "out",
+            ),
             capture_output=True,
             text=True,
             cwd=tmp_path,
@@ -60,7 +69,7 @@ def test_a_killed_run_is_resumed_by_another_process_and_no_step_is_lost(tmp_path
     )
     try:
         emulator.stdout.readline()
-        words = ("run", str(ROOT / "examples/table1_case1.toml"), "--port", str(link), "--out", "out")
+        words = ("run", str(ROOT / "examples/table1_case1.toml"), "--port", str(link), "--at-start", "--out", "out")
         with subprocess.Popen(command(*words), stderr=subprocess.PIPE, text=True, cwd=tmp_path) as run:
             said = []
             for line in run.stderr:

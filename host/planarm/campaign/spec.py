@@ -16,12 +16,13 @@ from planarm.scene.strict_toml import Table
 ROOT_KEYS = ("name", "kind", "scenes", "batch", "limits", "vary", "options")
 LIMIT_KEYS = ("task_s", "memory_mb")
 RANGE_KEYS = ("first", "count")
-KINDS = ("map", "search", "plan", "line", "self-test")
+KINDS = ("map", "search", "plan", "line", "faults", "self-test")
 OPTION_KEYS: Mapping[str, tuple[str, ...]] = {
     "map": (),
     "search": (),
     "plan": (),
     "line": ("seconds",),
+    "faults": (),
     "self-test": (),
 }
 MOST_TASKS = 10**9

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from planarm.campaign.fault_runs import run_faults
 from planarm.campaign.line_faults import run_line
 from planarm.campaign.task import Figures, SceneText, Value
 from planarm.errors import CertificateError, NoPathError, SceneError, TimingError
@@ -38,6 +39,7 @@ def run_kind(kind: str, scene: SceneText, settings: Mapping[str, Value], options
         "search": run_search,
         "plan": run_plan,
         "line": run_line_kind,
+        "faults": run_faults_kind,
     }
     return work[kind](scene, settings, options)
 
@@ -100,6 +102,11 @@ def run_plan(scene: SceneText, settings: Mapping[str, Value], _options: Mapping[
 def run_line_kind(scene: SceneText, settings: Mapping[str, Value], options: Mapping[str, Value]) -> Outcome:
     """Play a recorded stream to the emulated board with the line damaged, and judge the pins."""
     return run_line(_recordable(scene, _frozen(settings)), settings, options)
+
+
+def run_faults_kind(scene: SceneText, settings: Mapping[str, Value], options: Mapping[str, Value]) -> Outcome:
+    """Stream live with one mishap, resume, and hold pins and verdicts against each other."""
+    return run_faults(_recordable(scene, _frozen(settings)), settings, options)
 
 
 def scene_of(scene: SceneText, settings: Mapping[str, Value]) -> Scene:

@@ -89,6 +89,9 @@ def build_parser() -> argparse.ArgumentParser:
     _add_replan(commands)
     _add_stream(commands)
     _add_resume(commands)
+    _add_recorder(commands)
+    _add_board(commands)
+    _add_arm(commands)
     _add_envelope(commands)
     _add_emulate(commands)
     _add_compare(commands)
@@ -135,6 +138,7 @@ def _add_run(commands: Commands) -> None:
     _add_scene(command)
     _add_port(command)
     command.add_argument("--out", metavar="DIR", help="folder for report.html, plan, trace, summary and pictures")
+    _add_at_start(command)
     command.add_argument("--faults", metavar="FILE", help="a schedule of what goes wrong around the emulated board")
     command.add_argument("--fault-seed", type=int, metavar="N", help="in place of the schedule's own seed")
     command.add_argument(
@@ -163,6 +167,7 @@ def _add_stream(commands: Commands) -> None:
     command.add_argument("plan", metavar="FILE.plan")
     command.add_argument("--arm", metavar="SCENE", help="the arm that is connected: a plan for another one is refused")
     _add_port(command)
+    _add_at_start(command)
     command.add_argument("--out", metavar="DIR", help="folder for plan and journal (out/NAME)")
     _add_json(command)
 
@@ -180,6 +185,63 @@ def _add_resume(commands: Commands) -> None:
     command.add_argument("--check", action="store_true", help="only tell the verdict")
     command.add_argument("--yes", action="store_true", help="go on from a bounded position, too")
     _add_json(command)
+
+
+def _add_recorder(commands: Commands) -> None:
+    command = commands.add_parser("dump", help="a run's journal, or a byte stream, as readable messages")
+    command.add_argument("file", metavar="RUN|FILE", help="a run's folder, a journal, or bytes that a host sent")
+    _add_json(command)
+    command = commands.add_parser("replay", help="play what a run sent into the emulated board", epilog=EXIT_CODES)
+    command.add_argument("run", metavar="RUN", help="the run's folder")
+    command.add_argument("--firmware", metavar="HEX", help="the image to run (default: the released firmware)")
+    command.add_argument("--vcd", metavar="FILE", help="write the pins' waveforms")
+    _add_json(command)
+
+
+def _add_board(commands: Commands) -> None:
+    command = commands.add_parser("doctor", help="ports with their lasting names, rights, other programs, tools, disk")
+    command.add_argument("--port", metavar="URL", help="ask the board there, too")
+    _add_json(command)
+    command = commands.add_parser("flash", help="write the released image to an Uno, and verify it", epilog=EXIT_CODES)
+    command.add_argument("--port", metavar="DEVICE", required=True, help="the board's device")
+    command.add_argument("--image", metavar="HEX", help="another image; it is not asked who it is")
+    _add_json(command)
+    command = commands.add_parser(
+        "stop",
+        help="stop the motion along its path, from any terminal",
+        description="Slow down along the path and drop the rest; the position is kept. A program that has the port is\n"
+        "asked to do it. --emergency ends all pulses at once: the position is lost. A real emergency stop cuts\n"
+        "the motors' supply.",
+        epilog=EXIT_CODES,
+    )
+    command.add_argument("--port", metavar="URL", required=True, help="the board's device or URL")
+    command.add_argument("--quick", action="store_true", help="as fast as the segments allow")
+    command.add_argument("--emergency", action="store_true", help="end all pulses at once")
+    _add_json(command)
+
+
+def _add_arm(commands: Commands) -> None:
+    """Add what needs the scene of the arm that is connected."""
+    described = {
+        "status": "what the board does, and where its arm stands",
+        "zero": "tell the board where an arm without limit switches stands",
+        "home": "move every joint to its limit switch",
+        "jog": "turn one joint by an angle",
+        "goto": "go to a point on a certified path",
+    }
+    parsers = {name: commands.add_parser(name, help=text, epilog=EXIT_CODES) for name, text in described.items()}
+    for command in parsers.values():
+        command.add_argument("scene", metavar="SCENE", help="scene file (TOML) of the arm that is connected")
+    parsers["zero"].add_argument(
+        "--at", nargs=2, type=float, metavar=("X", "Y"), help="the tip's place in cm (default: the task's start)"
+    )
+    parsers["jog"].add_argument("joint", type=_count, metavar="JOINT", help="from 1")
+    parsers["jog"].add_argument("degrees", type=float, metavar="DEGREES", help="counter-clockwise above 0")
+    parsers["goto"].add_argument("x_cm", type=float, metavar="X", help="in cm")
+    parsers["goto"].add_argument("y_cm", type=float, metavar="Y", help="in cm")
+    for command in parsers.values():
+        _add_port(command)
+        _add_json(command)
 
 
 def _add_envelope(commands: Commands) -> None:
@@ -346,6 +408,12 @@ def _add_scene(command: argparse.ArgumentParser) -> None:
     command.add_argument("--neighbours", type=int, metavar="N", help="overrides the scene's neighbourhood")
     command.add_argument("--seed", type=int, metavar="N", help="overrides the scene's seed (Chaos A*)")
     command.add_argument("--space", choices=("tip", "joint"), help="plan the tip's way, or the joints' (both elbows)")
+
+
+def _add_at_start(command: argparse.ArgumentParser) -> None:
+    command.add_argument(
+        "--at-start", action="store_true", help="you say that the arm stands where the plan begins; the board is told"
+    )
 
 
 def _add_port(command: argparse.ArgumentParser) -> None:

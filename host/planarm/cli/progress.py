@@ -3,61 +3,124 @@
 from __future__ import annotations
 
 import sys
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from rich.progress import Progress as RichProgress
+    from rich.progress import TaskID
+
     from planarm.campaign.run import Progress
+    from planarm.link.remaining import Remaining
+    from planarm.link.stream import StreamProgress
 
-Report = Callable[[str, float], None]
-"""Takes the stage's name and the share done, 0 to 1."""
+STREAM = "stream"
+"""The stage in which a device executes a motion."""
+
+
+class Shown:
+    """What a command tells its progress to: the share of a stage, and everything of a motion under way."""
+
+    def __call__(self, stage: str, share: float) -> None:
+        """Take a stage's name and the share of it that is done, 0 to 1."""
+
+    def watch(self, told: StreamProgress) -> None:
+        """Take what the device tells of a motion."""
+
+    def warn(self, text: str) -> None:
+        """Take what will be otherwise than planned."""
 
 
 @contextmanager
-def progress(quiet: bool) -> Iterator[Report]:
-    """Give a function that shows how far the work is, on stderr so that stdout stays for results."""
+def progress(quiet: bool) -> Iterator[Shown]:
+    """Give what shows how far the work is, on stderr so that stdout stays for results."""
     if quiet:
-        yield lambda _stage, _share: None
+        yield Shown()
     elif sys.stderr.isatty():
-        with _bar() as report:
-            yield report
+        with _bar() as shown:
+            yield shown
     else:
-        yield _lines()
+        yield Lines()
 
 
-def _lines() -> Report:
-    told: set[tuple[str, int]] = set()
+class Lines(Shown):
+    """A line for each quarter of a stage; of a motion with path time, queue and remaining time."""
 
-    def report(stage: str, share: float) -> None:
+    def __init__(self, wall_s: Callable[[], float] = time.monotonic) -> None:
+        self._told: set[tuple[str, int]] = set()
+        self._wall_s = wall_s
+        self._remaining: Remaining | None = None
+
+    def __call__(self, stage: str, share: float) -> None:
+        """Print a quarter once; those of a motion come with `watch`."""
+        if stage != STREAM:
+            self._print(stage, share, "")
+
+    def watch(self, told: StreamProgress) -> None:
+        """Print a quarter once, with what there is to know."""
+        from planarm.link.remaining import Remaining, words_of
+
+        self._remaining = self._remaining or Remaining(self._wall_s)
+        left_s = self._remaining.after(told)
+        self._print(STREAM, told.path_s / told.total_s, f" ({words_of(told, left_s)})")
+
+    def warn(self, text: str) -> None:
+        """Print it."""
+        print(f"note: {text}", file=sys.stderr, flush=True)
+
+    def _print(self, stage: str, share: float, more: str) -> None:
         quarter = int(4 * share)
-        if (stage, quarter) not in told:
-            told.add((stage, quarter))
-            print(f"{stage}: {25 * quarter} %", file=sys.stderr, flush=True)
-
-    return report
+        if (stage, quarter) not in self._told:
+            self._told.add((stage, quarter))
+            print(f"{stage}: {25 * quarter} %{more}", file=sys.stderr, flush=True)
 
 
 @contextmanager
-def _bar() -> Iterator[Report]:
+def _bar() -> Iterator[Shown]:
     from rich.console import Console
-    from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeElapsedColumn
+    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
     columns = (
         TextColumn("{task.description:>10}"),
         BarColumn(),
         TextColumn("{task.percentage:3.0f} %"),
         TimeElapsedColumn(),
+        TextColumn("{task.fields[words]}"),
     )
     with Progress(*columns, console=Console(stderr=True)) as bar:
-        tasks: dict[str, TaskID] = {}
+        yield Bar(bar)
 
-        def report(stage: str, share: float) -> None:
-            if stage not in tasks:
-                tasks[stage] = bar.add_task(stage, total=1.0)
-            bar.update(tasks[stage], completed=share)
 
-        yield report
+class Bar(Shown):
+    """A bar for each stage; of a motion with path time, queue and remaining time behind it."""
+
+    def __init__(self, bar: RichProgress) -> None:
+        self._bar = bar
+        self._tasks: dict[str, TaskID] = {}
+        self._remaining: Remaining | None = None
+
+    def __call__(self, stage: str, share: float) -> None:
+        """Move the stage's bar."""
+        self._bar.update(self._task(stage), completed=share)
+
+    def watch(self, told: StreamProgress) -> None:
+        """Move the motion's bar, and say what there is to know."""
+        from planarm.link.remaining import Remaining, words_of
+
+        self._remaining = self._remaining or Remaining(time.monotonic)
+        words = words_of(told, self._remaining.after(told))
+        self._bar.update(self._task(STREAM), completed=told.path_s / told.total_s, words=words)
+
+    def warn(self, text: str) -> None:
+        """Print it above the bars."""
+        self._bar.console.print(f"note: {text}", markup=False)
+
+    def _task(self, stage: str) -> TaskID:
+        if stage not in self._tasks:
+            self._tasks[stage] = self._bar.add_task(stage, total=1.0, words="")
+        return self._tasks[stage]
 
 
 def counting_bar() -> Callable[[Progress], None]:

@@ -19,8 +19,10 @@ if TYPE_CHECKING:
 def execute(options: argparse.Namespace) -> int:
     """Tell the verdict; unless only asked for that, go on with the run."""
     tell_first_compile("planarm", "planarm_sim")
+    from planarm.link.positions import Positions, default_path
     from planarm.link.transport import open_transport
     from planarm.pipeline import telling
+    from planarm.plan_file import arm_hash
     from planarm.resume import go_on, load_run, meet_again
 
     run = load_run(Path(options.run))
@@ -31,7 +33,11 @@ def execute(options: argparse.Namespace) -> int:
             _tell(options.json, report, None)
             return 0
         with progress(options.json) as notice:
-            report, result = go_on(run, transport, lambda told: _confirmed(told, options), telling(notice))
+            report, result = go_on(
+                run, transport, lambda told: _confirmed(told, options), telling(notice, notice.watch)
+            )
+    if result is not None and "://" not in port:
+        Positions(default_path()).remember(port, result.boot_nonce, arm_hash(run.stored.scene), "resumed")
     _tell(options.json, report, result.segments if result else 0)
     return 0
 

@@ -31,7 +31,16 @@ def execute(options: argparse.Namespace) -> int:
         try:
             with live_view(options.live) as onlooker:
                 summary = run_scene(
-                    scene, port, out, notice, faults=faults, fault_seed=options.fault_seed, onlooker=onlooker
+                    scene,
+                    port,
+                    out,
+                    notice,
+                    faults=faults,
+                    fault_seed=options.fault_seed,
+                    onlooker=onlooker,
+                    watch=notice.watch,
+                    warn=notice.warn,
+                    at_start=options.at_start,
                 )
         except PlanarmError as error:
             if faults is not None:

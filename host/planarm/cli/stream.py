@@ -15,12 +15,14 @@ def execute(options: argparse.Namespace) -> int:
     """Stream a certified plan and tell what the device executed."""
     tell_first_compile("planarm", "planarm_sim")
     from planarm.link.position import moved_usteps
+    from planarm.link.positions import Positions, default_path
     from planarm.link.transport import open_transport
     from planarm.pipeline import telling
     from planarm.plan_file import load_plan, require_arm
     from planarm.run_folder import begin_run_folder
     from planarm.scene import load_scene
     from planarm.scene.rebuild import scene_from_mapping
+    from planarm.standing import settle_start
     from planarm.streaming import options_for, record, stream
 
     plan = load_plan(Path(options.plan))
@@ -31,8 +33,11 @@ def execute(options: argparse.Namespace) -> int:
     out = Path(options.out) if options.out else Path("out") / Path(options.plan).stem
     begin_run_folder(out, plan)
     with progress(options.json) as notice, closing(open_transport(port, scene.link.baud)) as transport:
+        positions = Positions(default_path())
         line = record(transport, out, port, scene)
-        result = stream(plan.segments, plan.certificate, line, telling(notice), options_for(scene, plan.segments))
+        settle_start(line, port, scene, plan.segments.start_usteps, positions, vouched=options.at_start)
+        watch, how = telling(notice, notice.watch), options_for(scene, plan.segments)
+        result = stream(plan.segments, plan.certificate, line, watch, how, warn=notice.warn)
     moved = moved_usteps(result.ledger_before, result.ledger_after)
     told = {"moved_usteps": list(moved), "retransmissions": result.retransmissions, "run": str(out)}
     print(json.dumps(told) if options.json else f"executed {told['moved_usteps']} micro-steps")

@@ -12,7 +12,7 @@ from planarm.errors import DeviceFault, LinkError
 from planarm.link.knock import ask_expected
 from planarm.link.position import Known, Meeting, PositionReport, StreamError, StreamFault, judge
 from planarm.link.session import Session, SessionLimits, fault_words
-from planarm.link.stream import Joining, Phase, Stream, StreamOptions, StreamProgress
+from planarm.link.stream import PERCENT, Joining, Phase, Stream, StreamOptions, StreamProgress
 from planarm.link.transport import Transport
 from planarm_wire.messages import Fault, HostMessage, Ledger, Query, Segment, State, Status
 
@@ -46,6 +46,8 @@ class StreamResult:
     bytes_lost: int
     """Bytes the device lost in its USART or for want of room in its ring."""
     damaged_replies: int
+    path_clock_percent: int
+    """Rate of the path clock for the line's sake: 100 unless the line is too slow for the plan."""
     least_queued: int
     """Fewest segments seen in the device's queue while more were to come."""
     cleared_fault: Fault
@@ -60,6 +62,7 @@ def stream_plan(
     limits: SessionLimits | None = None,
     joining: Joining | None = None,
     steer: Callable[[Stream], None] | None = None,
+    warn: Callable[[str], None] | None = None,
 ) -> StreamResult:
     """Open a session, execute `segments` and check the device's ledger against them.
 
@@ -70,7 +73,8 @@ def stream_plan(
     the arm slows down and rests on the path. A second Ctrl-C is a stop: the rest of the plan is dropped, and a
     StreamError tells the position. A third does not wait for that. With `joining` the device has begun the motion and
     holds a part of it; the rest is sent. `steer` is handed the stream at every pass while it runs: it may call its
-    `hold`, `resume`, `override` and `stop`.
+    `hold`, `resume`, `override` and `stop`. `warn` is told, before the motion starts, when the line is too slow for the
+    plan and the path clock will run slowly for that.
     """
     began_s = transport.clock.now_s()
     if not segments:
@@ -78,7 +82,7 @@ def stream_plan(
         request(transport, session, Query())
         return _result(session, transport.clock.now_s(), began_s)
     session = _new_session(transport, limits)
-    stream = Stream(session, segments, options, on_progress, joining)
+    stream = Stream(session, segments, options, on_progress, joining, warn)
     try:
         _drive_with_keyboard(transport, session, stream, steer)
     except KeyboardInterrupt as stop:
@@ -228,6 +232,7 @@ def _result(session: Session, now_s: float, began_s: float, stream: Stream | Non
         crc_errors=session.line.crc_errors,
         bytes_lost=session.line.overruns + session.line.ring_full,
         damaged_replies=session.line.damaged_replies,
+        path_clock_percent=stream.path_clock_percent if stream else PERCENT,
         least_queued=stream.least_queued if stream else 0,
         cleared_fault=stream.cleared_fault if stream else Fault.NONE,
     )

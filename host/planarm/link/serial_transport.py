@@ -14,9 +14,13 @@ import serial.tools.list_ports
 
 from planarm.errors import LinkError
 from planarm.link.clock import Clock, RealClock
+from planarm.link.port_holder import holders
 
 WRITE_TIMEOUT_S = 1.0  # 25,000 bytes at 250,000 baud; more than ever waits to be sent
 TERMIOS2_BYTES, TCGETS2, TCSETS2 = 44, 0x802C542A, 0x402C542B  # Linux, asm-generic/termbits.h; c_cflag is at 8
+BOOT_BAUD = 115_200
+RFC2217 = "rfc2217:"
+"""pyserial 3.5 knows no time-out of writing there; the network's own ends it."""
 _SLICE_S = 0.005  # how late a deadline may be noticed on lines that select() does not know
 
 
@@ -30,10 +34,10 @@ class SerialTransport:
         self.url = url
         self.clock: Clock = RealClock()
         self._port = _open(url, baud)
-        self._descriptor = _descriptor(self._port)
-        if self._descriptor is not None:
+        self.descriptor = _descriptor(self._port)
+        if self.descriptor is not None:
             self._port.timeout = 0
-            _prepare_terminal(self._port, self._descriptor)
+            _prepare_terminal(self._port, self.descriptor)
 
     def nonce(self) -> int:
         """A random number of 32 bits."""
@@ -58,9 +62,9 @@ class SerialTransport:
         self._port.close()
 
     def _receive(self, max_bytes: int, wait_s: float) -> bytes:
-        if self._descriptor is not None:
+        if self.descriptor is not None:
             if self._port.is_open:
-                select.select([self._descriptor], [], [], None if wait_s == float("inf") else wait_s)
+                select.select([self.descriptor], [], [], None if wait_s == float("inf") else wait_s)
             return bytes(self._port.read(max_bytes))
         first = bytes(self._port.read(1))
         return first + bytes(self._port.read(min(max_bytes - 1, self._port.in_waiting))) if first else b""
@@ -87,7 +91,7 @@ def _open(url: str, baud: int) -> serial.SerialBase:
             url,
             baudrate=baud,
             timeout=_SLICE_S,
-            write_timeout=WRITE_TIMEOUT_S,
+            write_timeout=None if url.lower().startswith(RFC2217) else WRITE_TIMEOUT_S,
             exclusive=True if os.name == "posix" and "://" not in url else None,
         )
     except (serial.SerialException, OSError, ValueError) as error:
@@ -102,7 +106,8 @@ def _why_not_opened(url: str, baud: int, error: Exception) -> str:
     if code in (errno.EACCES, errno.EPERM):
         return f"port {url}: permission denied; {_how_to_get_permission(url)}"
     if code in (errno.EBUSY, errno.EAGAIN, errno.EWOULDBLOCK):
-        return f"port {url}: in use by another program; close that program first"
+        others = ", ".join(str(one) for one in holders(url) if one.pid != os.getpid()) or "another program"
+        return f"port {url}: in use by {others}; close that program first"
     return f"port {url}: cannot be opened at {baud} baud ({error})"
 
 
@@ -148,8 +153,20 @@ def _prepare_terminal(port: serial.SerialBase, descriptor: int) -> None:
             port.set_low_latency_mode(True)
 
 
-def _keep_dtr(descriptor: int) -> None:
-    """Switch HUPCL off, and leave everything else as it is: `termios.tcsetattr` would lose a rate such as 250,000."""
+def let_go(path: str) -> None:
+    """Have DTR fall at a port that is closed, so that the next opening resets the board again, as uploading needs.
+
+    Raises:
+        LinkError: it cannot be opened.
+    """
+    transport = SerialTransport(path, BOOT_BAUD)
+    if transport.descriptor is not None and os.isatty(transport.descriptor):
+        _keep_dtr(transport.descriptor, keep=False)
+    transport.close()
+
+
+def _keep_dtr(descriptor: int, *, keep: bool = True) -> None:
+    """Switch HUPCL off or on, and leave all else as it is: `termios.tcsetattr` would lose a rate such as 250,000."""
     import fcntl  # noqa: PLC0415 - POSIX only
     import termios  # noqa: PLC0415
 
@@ -157,6 +174,7 @@ def _keep_dtr(descriptor: int) -> None:
         return
     settings = bytearray(TERMIOS2_BYTES)
     fcntl.ioctl(descriptor, TCGETS2, settings)
-    control = int.from_bytes(settings[8:12], sys.byteorder) & ~termios.HUPCL
+    control = int.from_bytes(settings[8:12], sys.byteorder)
+    control = control & ~termios.HUPCL if keep else control | termios.HUPCL
     settings[8:12] = control.to_bytes(4, sys.byteorder)
     fcntl.ioctl(descriptor, TCSETS2, bytes(settings))

@@ -10,30 +10,27 @@ says when it is done. A hold that nobody here asked for, as a damaged byte may c
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from enum import Enum, auto
 from itertools import accumulate
 
 from planarm.errors import CertificateError, LinkError, StepsDifferError
+from planarm.link.margin import line_margin
 from planarm.link.packing import Packer
 from planarm.link.plan_steps import PlanSteps
 from planarm.link.position import executed_since, moved_usteps
 from planarm.link.session import Session
+from planarm.link.stream_values import AT_EASE, Joining, Phase, StreamOptions, StreamProgress, config_of
 from planarm_wire.codec import encoded_bytes
 from planarm_wire.messages import (
-    DEFAULT_WAKE_TICKS,
     HOLD_CODE,
     QUEUE_BYTES,
     QUEUE_FRAME_BYTES,
     TICKS_HZ,
     Clear,
-    Config,
     Enable,
     Fault,
     HostMessage,
     Ledger,
     Override,
-    PinMap,
     Query,
     Resume,
     Segment,
@@ -42,85 +39,13 @@ from planarm_wire.messages import (
     Status,
     Stop,
 )
-from planarm_wire.rates import Allowance
 from planarm_wire.steps import duration_ticks, is_last
+
+__all__ = ["AT_EASE", "PERCENT", "Joining", "Phase", "Stream", "StreamOptions", "StreamProgress", "config_of"]
 
 MIN_POLL_S = 0.002  # a status and its question take 1.5 ms of the line
 MAX_POLL_S = 0.050  # keeps progress alive during long segments
 PERCENT = 100
-AT_EASE = (State.HOLDING, State.HELD, State.STARVED, State.STOPPING)
-"""States of a motion in which the path clock does not keep the plan's time."""
-
-
-@dataclass(frozen=True, slots=True)
-class StreamOptions:
-    """How a plan is streamed.
-
-    `lead_ticks` lies between START and the first segment; the 10 ms cover a DM542's response to ENABLE, quoted as under
-    5 ms. `release_when_done` lets go of the joints at the end: a loaded arm falls, so the drivers stay enabled unless
-    asked. `allowances`, one a segment, let the device slow down along the path; without them it cannot. The motors'
-    `start_stop_ticks` tell it from which interval on they may stop dead; a device whose drivers are enabled keeps what
-    it was told before. `released_spread_usteps` is how far each joint can move by itself while the drivers are
-    released; empty: any way. `start_at_s` is a time of the clock at which the first segment is due: START is given the
-    lead that is left until then, at least `lead_ticks`.
-    """
-
-    lead_ticks: int = 160_000
-    release_when_done: bool = False
-    allowances: tuple[Allowance, ...] = ()
-    start_stop_ticks: tuple[int, ...] = ()
-    released_spread_usteps: tuple[int, ...] = ()
-    start_at_s: float | None = None
-
-
-@dataclass(frozen=True, slots=True)
-class StreamProgress:
-    """How far the motion is, by the device's ledger."""
-
-    path_s: float
-    """Path time of the whole segments executed."""
-    total_s: float
-    executed_segments: int
-    total_segments: int
-    queued_segments: int
-    """Segments sent and not yet executed."""
-    moved_usteps: tuple[int, ...]
-    """Signed micro-steps of each joint since the start, those of the running segment included."""
-    state: State
-    at_s: float
-    """Of the transport's clock."""
-    free_bytes: int
-    """Of the device's queue."""
-    retransmissions: int
-    """Frames sent again so far."""
-
-
-@dataclass(frozen=True, slots=True)
-class Joining:
-    """A motion of which the device holds a part, sent by a session that ended.
-
-    Attributes:
-        before: the ledger at its start.
-        accepted_segments: what the device took.
-    """
-
-    before: Ledger
-    accepted_segments: int
-
-
-class Phase(Enum):
-    """Where the stream is; each lasts until its frames are acknowledged."""
-
-    OPENING = auto()
-    ASKING = auto()
-    CLEARING = auto()
-    CONFIGURING = auto()
-    ENABLING = auto()
-    FILLING = auto()
-    STARTING = auto()
-    RUNNING = auto()
-    RELEASING = auto()
-    DONE = auto()
 
 
 class Stream:
@@ -137,6 +62,7 @@ class Stream:
         options: StreamOptions | None = None,
         on_progress: Callable[[StreamProgress], None] | None = None,
         joining: Joining | None = None,
+        warn: Callable[[str], None] | None = None,
     ) -> None:
         _check_ends(segments)
         self.steps = PlanSteps.of(segments)
@@ -147,6 +73,10 @@ class Stream:
         self.least_queued = len(segments)
         self.stopped = False
         self.unasked_holds = 0
+        self.path_clock_percent = PERCENT
+        self._warn = warn
+        self._filling_since_s = 0.0
+        self._filled_from_bytes = 0
         self._session = session
         self._segments = tuple(segments)
         self._options = options or StreamOptions()
@@ -278,20 +208,34 @@ class Stream:
             self._session.send(Enable(1), now_s)
         self.phase = Phase.ENABLING
 
-    def _begin_filling(self, _now_s: float) -> None:
+    def _begin_filling(self, now_s: float) -> None:
         if not self._session.idle:
             return
         if self._status.state is not State.READY:
             raise LinkError(f"the device took ENABLE but reports {self._status.state.name.lower()}; reset the board")
         self._session.guarded = True
         self.ledger_before = self._status.ledger
+        self._filling_since_s = now_s
+        self._filled_from_bytes = self._session.arq_counters.bytes_sent
         self.phase = Phase.FILLING
 
     def _fill(self, now_s: float) -> None:
         self._send_segments(now_s)
         if self._session.idle:  # the queue is full, or the whole plan is in it
+            self._set_path_clock(now_s)
             self._session.send(Start(self._lead_ticks(now_s)), now_s)
             self.phase = Phase.STARTING
+
+    def _set_path_clock(self, now_s: float) -> None:
+        """Let the path clock run as planned, or slower where the line was not seen to carry the plan."""
+        if self.sent_segments < len(self._segments):
+            seen = self._session.arq_counters.bytes_sent - self._filled_from_bytes
+            margin = line_margin(self._segments, self.sent_segments, seen, now_s - self._filling_since_s)
+            self.path_clock_percent = margin.percent
+            if margin.percent < PERCENT and self._warn is not None:
+                self._warn(str(margin))
+        if self._status.override_percent != self.path_clock_percent:
+            self._session.send(Override(self.path_clock_percent), now_s)
 
     def _lead_ticks(self, now_s: float) -> int:
         """Return the time from START to the first segment."""
@@ -415,6 +359,7 @@ class Stream:
             at_s=now_s,
             free_bytes=status.free_bytes,
             retransmissions=self._session.arq_counters.retransmissions,
+            rate_percent=status.rate_percent,
         )
 
     def _stall_due_s(self) -> float:
@@ -447,12 +392,6 @@ class Stream:
                     f"joint {joint} moved by {done:+d} usteps by the device's ledger, the plan has {meant:+d}"
                     f" ({done - meant:+d}); home the arm before the next motion"
                 )
-
-
-def config_of(start_stop_ticks: Sequence[int]) -> Config:
-    """Return the wiring that is the firmware's default, with these start-stop intervals."""
-    told = tuple(start_stop_ticks)
-    return Config(PinMap.OWN, len(told), 0, 0, 0, DEFAULT_WAKE_TICKS, 0, told)
 
 
 def _check_ends(segments: Sequence[Segment]) -> None:

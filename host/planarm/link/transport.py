@@ -5,6 +5,8 @@
 ``sim://?image=PATH``           the same with another flash image (Intel HEX)
 ``sim://?usb=16u2``             the same with the delays and limits of the board's USB bridge
 ``/dev/ttyACM0``, ``COM3``      a serial port or a pty
+``file://PATH``                 what is sent goes into a file, and an emulated board answers
+``spy+URL``, ``spy+URL#FILE``   any of these, with everything that passes in a journal (spy.journal)
 ``socket://host:port`` and      whatever pyserial opens by URL
 ``rfc2217://``, ``loop://`` ..
 ==============================  =====================================================================
@@ -23,6 +25,9 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 SIM_SCHEME = "sim"
+FILE_SCHEME = "file"
+SPY_PREFIX = "spy+"
+SPY_FILE = "spy.journal"
 PYSERIAL_SCHEMES = ("alt", "cp2110", "hwgrep", "loop", "rfc2217", "socket", "spy")
 
 
@@ -91,15 +96,36 @@ def open_transport(url: str, baud: int = BAUD, setup: ArmSetup | None = None) ->
         LinkError: it cannot be opened; the message tells why.
         EmulatorError: the setup cannot be built.
     """
-    scheme, separator, _ = url.partition("://")
+    if url.startswith(SPY_PREFIX):
+        return _open_spied(url.removeprefix(SPY_PREFIX), baud, setup)
+    scheme, separator, rest = url.partition("://")
     if not separator or scheme.lower() in PYSERIAL_SCHEMES:
         from planarm.link.serial_transport import SerialTransport  # noqa: PLC0415 - pyserial only where it is used
 
         return SerialTransport(url, baud)
     if scheme.lower() == SIM_SCHEME:
         return _open_emulator(url, baud, setup)
-    known = ", ".join(f"{name}://" for name in (SIM_SCHEME, *PYSERIAL_SCHEMES))
+    if scheme.lower() == FILE_SCHEME:
+        from planarm.link.file_transport import FileTransport  # noqa: PLC0415 - the emulator only where it is used
+
+        if not rest:
+            raise LinkError(f"port {url!r}: give a path, as in file://stream.bin")
+        return FileTransport(rest, baud, setup)
+    known = ", ".join(f"{name}://" for name in (SIM_SCHEME, FILE_SCHEME, *PYSERIAL_SCHEMES))
     raise LinkError(f"port {url!r}: unknown scheme {scheme!r}; give a device path or one of {known}")
+
+
+def _open_spied(url: str, baud: int, setup: ArmSetup | None) -> Transport:
+    from planarm.link.journal import JournalWriter  # noqa: PLC0415 - the journal only where one is kept
+    from planarm.link.recording import RecordingTransport  # noqa: PLC0415
+
+    inner, _, file = url.partition("#")
+    line = open_transport(inner, baud, setup)
+    path = Path(file or SPY_FILE)
+    path.unlink(missing_ok=True)
+    journal = JournalWriter(path)
+    journal.note(line.clock.now_s(), {"port": inner, "baud": baud})
+    return RecordingTransport(line, journal)
 
 
 def _open_emulator(url: str, baud: int, setup: ArmSetup | None) -> Transport:

@@ -1,0 +1,62 @@
+"""What `zero`, `home`, `jog`, `goto`, `status` and `stop` share: the scene, the line, and how a position is told."""
+
+from __future__ import annotations
+
+import argparse
+import json
+from collections.abc import Iterator
+from contextlib import closing, contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from planarm.link.positions import Positions
+    from planarm.link.transport import Transport
+    from planarm.scene import Scene
+
+
+@dataclass(frozen=True, slots=True)
+class Reached:
+    """An arm that a command can talk to."""
+
+    scene: Scene
+    port: str
+    transport: Transport
+    positions: Positions
+
+
+@contextmanager
+def reached(options: argparse.Namespace) -> Iterator[Reached]:
+    """Open the line to the scene's arm."""
+    from planarm.link.positions import Positions, default_path
+    from planarm.link.transport import open_transport
+    from planarm.scene import load_scene
+
+    scene = load_scene(Path(options.scene))
+    port = scene.link.port if options.port is None else options.port
+    with closing(open_transport(port, scene.link.baud)) as transport:
+        yield Reached(scene, port, transport, Positions(default_path()))
+
+
+def tell_standing(as_json: bool, scene: Scene, usteps: tuple[int, ...], how: str | None, **more: Any) -> None:  # noqa: ANN401 - figures
+    """Print where the arm stands, and by what that is known."""
+    from planarm.standing import pose_of
+
+    q_rad, tip_cm = pose_of(scene, usteps)
+    told = {
+        "known_by": how,
+        "usteps": list(usteps),
+        "joints_deg": [round(float(angle), 4) for angle in np.degrees(q_rad)],
+        "tip_cm": [round(tip_cm[0], 4), round(tip_cm[1], 4)],
+        **more,
+    }
+    if as_json:
+        print(json.dumps(told))
+        return
+    if how is None:
+        print("the board does not know where its arm stands: it was told nothing since it started")
+    for name, value in told.items():
+        print(f"{name}: {value}")

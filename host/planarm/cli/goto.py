@@ -1,0 +1,27 @@
+"""`planarm goto SCENE X Y`: plans a certified path from where the arm stands, and goes there."""
+
+from __future__ import annotations
+
+import argparse
+
+from planarm.cli.arm import reached, tell_standing
+from planarm.cli.progress import progress
+from planarm.cli.scenes import tell_first_compile
+
+
+def execute(options: argparse.Namespace) -> int:
+    """Plan, go, and tell where the arm stands then."""
+    tell_first_compile("planarm", "planarm_sim")
+    from planarm.arm_moves import goto
+    from planarm.link.position import moved_usteps
+    from planarm.pipeline import telling
+    from planarm.standing import look
+
+    with progress(options.json) as notice, reached(options) as arm:
+        standing = look(arm.transport, arm.port, arm.scene, arm.positions)
+        target_cm = (options.x_cm, options.y_cm)
+        _, done = goto(arm.transport, arm.scene, standing, target_cm, telling(notice, notice.watch))
+    moved = moved_usteps(done.ledger_before, done.ledger_after)
+    usteps = tuple(at + by for at, by in zip(standing.usteps, moved, strict=False))
+    tell_standing(options.json, arm.scene, usteps, standing.how, moved_usteps=list(moved))
+    return 0

@@ -1,0 +1,90 @@
+"""What a stream is given and what it tells, as values."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import Enum, auto
+
+from planarm_wire.messages import DEFAULT_WAKE_TICKS, Config, Ledger, PinMap, State
+from planarm_wire.rates import Allowance
+
+AT_EASE = (State.HOLDING, State.HELD, State.STARVED, State.STOPPING)
+"""States of a motion in which the path clock does not keep the plan's time."""
+
+
+@dataclass(frozen=True, slots=True)
+class StreamOptions:
+    """How a plan is streamed.
+
+    `lead_ticks` lies between START and the first segment; the 10 ms cover a DM542's response to ENABLE, quoted as under
+    5 ms. `release_when_done` lets go of the joints at the end: a loaded arm falls, so the drivers stay enabled unless
+    asked. `allowances`, one a segment, let the device slow down along the path; without them it cannot. The motors'
+    `start_stop_ticks` tell it from which interval on they may stop dead; a device whose drivers are enabled keeps what
+    it was told before. `released_spread_usteps` is how far each joint can move by itself while the drivers are
+    released; empty: any way. `start_at_s` is a time of the clock at which the first segment is due: START is given the
+    lead that is left until then, at least `lead_ticks`.
+    """
+
+    lead_ticks: int = 160_000
+    release_when_done: bool = False
+    allowances: tuple[Allowance, ...] = ()
+    start_stop_ticks: tuple[int, ...] = ()
+    released_spread_usteps: tuple[int, ...] = ()
+    start_at_s: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class StreamProgress:
+    """How far the motion is, by the device's ledger."""
+
+    path_s: float
+    """Path time of the whole segments executed."""
+    total_s: float
+    executed_segments: int
+    total_segments: int
+    queued_segments: int
+    """Segments sent and not yet executed."""
+    moved_usteps: tuple[int, ...]
+    """Signed micro-steps of each joint since the start, those of the running segment included."""
+    state: State
+    at_s: float
+    """Of the transport's clock."""
+    free_bytes: int
+    """Of the device's queue."""
+    retransmissions: int
+    """Frames sent again so far."""
+    rate_percent: int
+    """Of the path clock, as the device has it now; 0 while it stands still."""
+
+
+@dataclass(frozen=True, slots=True)
+class Joining:
+    """A motion of which the device holds a part, sent by a session that ended.
+
+    Attributes:
+        before: the ledger at its start.
+        accepted_segments: what the device took.
+    """
+
+    before: Ledger
+    accepted_segments: int
+
+
+class Phase(Enum):
+    """Where the stream is; each lasts until its frames are acknowledged."""
+
+    OPENING = auto()
+    ASKING = auto()
+    CLEARING = auto()
+    CONFIGURING = auto()
+    ENABLING = auto()
+    FILLING = auto()
+    STARTING = auto()
+    RUNNING = auto()
+    RELEASING = auto()
+    DONE = auto()
+
+
+def config_of(start_stop_ticks: Sequence[int]) -> Config:
+    """Return the wiring that is the firmware's default, with these start-stop intervals."""
+    told = tuple(start_stop_ticks)
+    return Config(PinMap.OWN, len(told), 0, 0, 0, DEFAULT_WAKE_TICKS, 0, told)

@@ -1,0 +1,132 @@
+"""Where an arm is known to stand, and the check that a motion begins there.
+
+A board knows its position from the moment that it is told one until it restarts; `planarm.link.positions` keeps which
+boots do. An emulated arm stands where its plan begins, because it was put there.
+"""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from planarm.errors import LinkError, UsageError
+from planarm.link.exchange import open_session, request
+from planarm.link.positions import Positions
+from planarm.link.session import Session
+from planarm.link.transport import Transport
+from planarm.model.arm import Arm
+from planarm.model.kinematics import forward, inverse_2r
+from planarm.model.transmission import Transmission
+from planarm.plan_file import arm_hash
+from planarm.scene import Scene
+from planarm_wire.messages import Query, SetPosition
+
+
+@dataclass(frozen=True, slots=True)
+class Standing:
+    """Where a board says that its arm is.
+
+    Attributes:
+        session: the open session.
+        usteps: of each motor, by the ledger.
+        how: by what it knows that; None: it was told nothing since it started.
+    """
+
+    session: Session
+    usteps: tuple[int, ...]
+    how: str | None
+
+
+def look(transport: Transport, port: str, scene: Scene, positions: Positions) -> Standing:
+    """Ask a board where its arm is.
+
+    Raises:
+        LinkError: it does not answer.
+        DeviceFault: it refuses.
+    """
+    session = open_session(transport)
+    status = request(transport, session, Query())
+    assert session.welcome is not None, "an open session has a welcome"
+    how = positions.how(port, session.welcome.boot_nonce, arm_hash(asdict(scene)))
+    return Standing(session, status.ledger.position_usteps[: len(scene.joints)], how)
+
+
+def tell(
+    transport: Transport, port: str, scene: Scene, positions: Positions, usteps: tuple[int, ...], how: str
+) -> None:
+    """Tell a board at rest where its arm is, and note that it knows.
+
+    Raises:
+        LinkError, DeviceFault: it does not take it.
+    """
+    session = open_session(transport)
+    request(transport, session, SetPosition(usteps))
+    assert session.welcome is not None, "an open session has a welcome"
+    positions.remember(port, session.welcome.boot_nonce, arm_hash(asdict(scene)), how)
+
+
+def usteps_at(scene: Scene, tip_cm: tuple[float, float]) -> tuple[int, ...]:
+    """Return where the motors stand with the tip at a point, on the scene's elbow side.
+
+    Raises:
+        UsageError: it is out of reach.
+    """
+    arm = Arm.from_spec(scene.arm)
+    q_rad = inverse_2r(arm, tip_cm, "down" if scene.arm.elbow == "down" else "up")
+    if np.isnan(q_rad).any():
+        raise UsageError(f"({tip_cm[0]:g}, {tip_cm[1]:g}) cm is out of the arm's reach; give a point that it reaches")
+    return tuple(int(n) for n in np.floor(Transmission.of(scene).usteps(q_rad) + 0.5))
+
+
+def pose_of(scene: Scene, usteps: tuple[int, ...]) -> tuple[NDArray[np.float64], tuple[float, float]]:
+    """Return joint angles and the tip's place for motors at `usteps`."""
+    q_rad = Transmission.of(scene).q_rad(np.array(usteps))
+    x_cm, y_cm = forward(Arm.from_spec(scene.arm), q_rad)[-1]
+    return q_rad, (float(x_cm), float(y_cm))
+
+
+def require_standing(standing: Standing, scene: Scene, wanted: tuple[int, ...]) -> None:
+    """Check that the arm is known to stand where a plan begins.
+
+    Raises:
+        LinkError: it is not; the message says what to do.
+    """
+    x_cm, y_cm = pose_of(scene, wanted)[1]
+    if standing.how is None:
+        raise LinkError(
+            f"where the arm stands is not known: the board restarted since it was told. The plan starts at ({x_cm:.2f},"
+            f" {y_cm:.2f}) cm: 'planarm home SCENE' with limit switches, or put the arm there and 'planarm zero SCENE'"
+        )
+    if standing.usteps != wanted:
+        at_cm = pose_of(scene, standing.usteps)[1]
+        raise LinkError(
+            f"the arm stands at ({at_cm[0]:.2f}, {at_cm[1]:.2f}) cm, {standing.usteps} usteps; the plan starts at"
+            f" ({x_cm:.2f}, {y_cm:.2f}) cm, {wanted}: 'planarm goto SCENE {x_cm:.4f} {y_cm:.4f}' brings it there"
+        )
+
+
+def settle_start(
+    transport: Transport, port: str, scene: Scene, wanted: tuple[int, ...], positions: Positions, *, vouched: bool
+) -> None:
+    """Make sure that the board and its arm are where a plan begins, before anything of it is sent.
+
+    Args:
+        transport: the line.
+        port: its name.
+        scene: of the arm that is connected.
+        wanted: where the plan begins.
+        positions: which boots know where they are.
+        vouched: somebody says that the arm stands there; the board is told.
+
+    Raises:
+        LinkError: it is not, or not known to be; the message says what to do.
+        DeviceFault: the board refuses.
+    """
+    if transport.pins is not None:
+        request(transport, open_session(transport), SetPosition(wanted))
+        return
+    if vouched:
+        tell(transport, port, scene, positions, wanted, "vouched for")
+    require_standing(look(transport, port, scene, positions), scene, wanted)
