@@ -35,10 +35,11 @@ GraphAlgorithm = Literal["mpd_star_lite", "d_star_lite", "roadmap_a_star"]
 Costing = Callable[[int], None]
 """Told a node; fills in the costs of all edges into it that are not known."""
 
-REPAIR_SHARE = 0.5
+REPAIR_SHARE = 0.2
 """A change is repaired when it concerns fewer nodes than this share of what a search anew expanded last.
 
-A node concerned is expanded about twice, once to forget and once to learn its distance."""
+A node concerned is expanded twice, once to forget and once to learn its distance, each for about the price of two
+expansions of A*; and a way that has become longer takes nodes that no way led through before."""
 
 
 NOWHERE = -1
