@@ -11,7 +11,7 @@ namespace wire {
 // Both ends must have the same.
 constexpr uint8_t PROTOCOL_VERSION = 2;
 // Of the specification without its wording.
-constexpr uint32_t SPEC_HASH = 0x15F1076AUL;
+constexpr uint32_t SPEC_HASH = 0x801DE8A3UL;
 
 // Ends every frame.
 constexpr uint8_t DELIMITER = 0x7E;
@@ -56,9 +56,9 @@ constexpr uint8_t HOST_WINDOW_BYTES = 112;
 constexpr uint16_t QUEUE_BYTES = 896U;
 // Bytes that each queued SEGMENTS frame takes besides its payload.
 constexpr uint8_t QUEUE_FRAME_BYTES = 1;
-// Least time between two steps of one joint, 69,500 steps/s; min_dir_setup_ticks more where it
-// turns round. Both joints together: 130,000 steps/s.
-constexpr uint8_t MIN_INTERVAL_TICKS = 230;
+// Least time between two steps of one joint, 65,041 steps/s; min_dir_setup_ticks more where it
+// turns round.
+constexpr uint8_t MIN_INTERVAL_TICKS = 246;
 // Unit of a segment's need, 2.048 ms.
 constexpr uint16_t NEED_UNIT_TICKS = 32768U;
 // Most by which the device stretches the path clock.

@@ -122,7 +122,7 @@ bool may_freeze(uint16_t counter) {
            static_cast<uint16_t>(hal::step_edge<JOINT>() - counter) > FREEZE_MARGIN_TICKS;
 }
 
-// What the interrupts change, copied at one instant.
+// What the interrupts change, as it was when the counter was read.
 struct Progress {
     uint16_t counter;
     const Run* active[wire::JOINTS];
@@ -131,18 +131,39 @@ struct Progress {
     uint8_t on;
 };
 
+void look(Progress& at) {
+    at.high[0] = hal::step_is_high<0>();
+    at.high[1] = hal::step_is_high<1>();
+    at.on = hal::step_interrupts_on() | step_missed;
+    at.left[0] = hal::steps_left<0>();
+    at.left[1] = hal::steps_left<1>();
+    at.active[0] = step_joints[0].active;
+    at.active[1] = step_joints[1].active;
+}
+
+bool is_same(const Progress& one, const Progress& other) {
+    bool same = one.on == other.on;
+    for (uint8_t joint = 0; joint < wire::JOINTS; ++joint) {
+        same = same && one.active[joint] == other.active[joint] && one.left[joint] == other.left[joint] &&
+               one.high[joint] == other.high[joint];
+    }
+    return same;
+}
+
+// Interrupts stay on but for the counter's two bytes, since a step that comes in a lock waits for its end,
+// too: what is the same before and after the counter was read was so at that moment.
 Progress progress() {
-    Progress copy;
-    const hal::InterruptLock lock;
-    copy.counter = hal::counter();
-    copy.high[0] = hal::step_is_high<0>();
-    copy.high[1] = hal::step_is_high<1>();
-    copy.on = hal::step_interrupts_on() | step_missed;
-    copy.left[0] = hal::steps_left<0>();
-    copy.left[1] = hal::steps_left<1>();
-    copy.active[0] = step_joints[0].active;
-    copy.active[1] = step_joints[1].active;
-    return copy;
+    Progress before;
+    Progress after;
+    do {
+        look(before);
+        {
+            const hal::InterruptLock lock;
+            before.counter = hal::counter();
+        }
+        look(after);
+    } while (!is_same(before, after));
+    return before;
 }
 
 }  // namespace

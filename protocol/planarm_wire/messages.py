@@ -13,7 +13,7 @@ from planarm_wire.layout import END, Field
 
 PROTOCOL_VERSION: Final = 2
 """Both ends must have the same."""
-SPEC_HASH: Final = 0x15F1076A
+SPEC_HASH: Final = 0x801DE8A3
 """Hash of the specification without its wording."""
 DELIMITER: Final = 0x7E
 """Ends every frame."""
@@ -56,11 +56,8 @@ QUEUE_BYTES: Final = 896
 """Bytes of queued segments that the firmware holds: a SEGMENTS frame takes its payload and queue_frame_bytes."""
 QUEUE_FRAME_BYTES: Final = 1
 """Bytes that each queued SEGMENTS frame takes besides its payload."""
-MIN_INTERVAL_TICKS: Final = 230
-"""Least time between two steps of one joint, 69,500 steps/s; min_dir_setup_ticks more where it turns round.
-
-Both joints together: 130,000 steps/s.
-"""
+MIN_INTERVAL_TICKS: Final = 246
+"""Least time between two steps of one joint, 65,041 steps/s; min_dir_setup_ticks more where it turns round."""
 NEED_UNIT_TICKS: Final = 32_768
 """Unit of a segment's need, 2.048 ms."""
 MAX_STRETCH: Final = 4_096

@@ -252,8 +252,8 @@ def test_full_rate_with_both_joints(
 
 @pytest.mark.parametrize(
     ("interval", "ratio"),
-    [(320, 1.0037), (246, 65_041 / 40_170), (246, 1.0)],
-    ids=["50,000 : 49,816", "65,041 : 40,170", "65,041 both"],
+    [(320, 1.0037), (246, 65_041 / 40_170), (256, 1.0)],
+    ids=["50,000 : 49,816", "65,041 : 40,170", "62,500 both"],
 )
 def test_constant_rates_on_a_saturated_line(
     emulated_firmware: EmulatedFirmware, interval: int, ratio: float, sized: Callable[[int, int], int]

@@ -14,11 +14,10 @@
 //   on and back               92       59              71                85
 //   going idle                77       59
 //   a step missed             85, after the last of a run 89, after a change of DIR 99
-// tests/firmware/test_firmware_cycles.py counts them. The interrupts allow a least interval that covers what
-// may run when its step rises (the longest lock of the main program or the receive interrupt, 41), the other
-// joint's interrupt (78), one instruction of the main program after each (4), its own way to the look at the
-// timer (60), and what that asks for (38): 225. From a step to one back the look comes after 71 and asks for
-// the DIR setup time (320).
+// tests/firmware/test_firmware_cycles.py counts them. The least interval of one joint covers what may run
+// when its step rises: the receive interrupt (40), a lock of the main program (11), the other joint's
+// interrupt (78), one more lock (11), its own way to the look at the timer (60), and what that asks for (38):
+// 238. From a step to one back the look comes after 71 and asks for the DIR setup time (320).
 
 #include <avr/interrupt.h>
 #include <avr/io.h>
