@@ -129,7 +129,7 @@ def _cases(cases: list[CaseResult]) -> TextTable:
             )
         )
     header = ("case", "each joint, J", "nodes", "way", "J", "RK4, J", "saved %", "ms", "printed way", "printed energy")
-    return TextTable("Tables 8 to 11: the way of least energy", header, tuple(rows), 2)
+    return TextTable("Tables 8 to 11: the way of least energy", header, tuple(rows), 1)
 
 
 def _replans(replans: tuple[ReplanResult, ...]) -> TextTable:
@@ -166,7 +166,7 @@ def _growth(rows: list[GrowthRow]) -> TextTable:
         if row.algorithm == name
     )
     header = ("", "nodes", "way", "expanded", "ms", "looks to tell", "again: expanded", "again: ms")
-    return TextTable(f"Table 6 anew: medians of {TASKS} tasks, one core", header, body, 1)
+    return TextTable(f"Table 6 anew: medians of {TASKS} tasks, CPU time of one core", header, body, 1)
 
 
 def _published(rows: list[GrowthRow]) -> TextTable:

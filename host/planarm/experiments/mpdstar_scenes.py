@@ -19,7 +19,7 @@ ASSUMPTIONS: Final = (
     "Figures 12 to 17 give no numbers: link lengths, obstacles, start and goal are chosen after the text.",
     "Masses: 0.4 kg a metre of link (aluminium tube), 0.15 kg at each link's end; the arm stands upright.",
     "Motors: Table 7's cannot move the arm (shown below); here a 24 V motor of the 60 W class behind 1 : 100, with one "
-    "constant for torque and back-EMF ([dc_motors] in docs/scene.md). Energies are joules; the paper gives no unit.",
+    "constant for torque and back-EMF (docs/scene.md, table dc_motors). Energies are joules; the paper gives no unit.",
     "An edge is a quintic from rest to rest, as fast as 90 deg/s and 360 deg/s2 allow; the paper gives no duration.",
     "Nodes: as many as the paper's table says, drawn at random; the first seed whose graph joins start and goal.",
 )
