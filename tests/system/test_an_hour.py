@@ -22,11 +22,11 @@ LOST_SHARE = 1e-4
 
 def test_every_step_of_a_long_motion_comes_once_although_bytes_are_lost(sized):
     """50 segments a second; a minute's worth of bytes are a few tens of thousands, so seconds lose some, too."""
-    seconds = sized(20, 3600)
+    seconds = sized(8, 3600)
     board = Uno.from_hex(released_image())
     board.run(seconds=0.02)
     lost = ActiveFault(
-        Fault("line.drop", 0.0, None, {"direction": "both", "share": LOST_SHARE * sized(20, 1)}),
+        Fault("line.drop", 0.0, None, {"direction": "both", "share": LOST_SHARE * sized(50, 1)}),
         0,
         1 << 62,
         np.random.default_rng(7),

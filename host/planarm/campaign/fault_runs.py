@@ -55,7 +55,8 @@ KINDS = ("none", *LINE_KINDS, *POWER_KINDS, *HOST_KINDS)
 BOOT_S = 0.02
 SPAN_S = 0.1
 """Opening, filling and the motors' waking take about so long before the first step."""
-SETTLE_S = 0.5
+SETTLE_S = 1.5
+"""What the queue holds, half a second, may take longer while the arm slows down."""
 IN_MEMORY = "/dev/shm"
 """Where Linux keeps files in memory: nobody cuts this computer's supply, so journals need no disk."""
 SPEED_TOLERANCE = 1.25
