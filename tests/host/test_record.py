@@ -88,7 +88,8 @@ def test_a_pulled_cable_leaves_a_whole_folder_with_the_error_in_it(tmp_path):
     assert record["error"]["kind"] == "StreamError"
     assert record["verdict"]["why"] == record["error"]["message"]
     assert [event["text"].split(":")[0] for event in record["events"] if event["lane"] == "line"] == ["StreamError"]
-    assert record["summary"]["steps_at_pins"] != record["summary"]["steps_planned"]
+    at_pins, planned = record["summary"]["steps_at_pins"], record["summary"]["steps_planned"]
+    assert sum(at_pins) > 0 and all(made <= whole for made, whole in zip(at_pins, planned, strict=True))
     assert json.loads((tmp_path / "summary.json").read_text())["error"]["kind"] == "StreamError"
     assert (tmp_path / "report.html").is_file()
 

@@ -125,7 +125,9 @@ def test_wrong_words_are_one_sentence(words, said, planned, tmp_path, capsys, mo
     code, out, err = leave(capsys, *words)
     assert (code, out) == (2, "")
     assert said in err
-    assert err.count("\n") == 1 or "read: " in err
+    sentence, told_by_code = err.removesuffix("\n").rsplit("\n", 1)
+    assert "\n" not in sentence or "read: " in sentence
+    assert told_by_code.startswith("  'planarm explain E")
 
 
 def test_a_file_called_diff_can_be_judged(planned, tmp_path, capsys, monkeypatch):

@@ -11,6 +11,7 @@ import errno
 import os
 import pty
 import select
+import termios
 import tty
 from pathlib import Path
 from types import TracebackType
@@ -42,6 +43,7 @@ class PtyLine:
             raise BridgeError(f"no pseudo-terminal: {error.strerror or error}") from error
         try:
             tty.setraw(slave)  # bytes pass unchanged also for hosts that set nothing; stays set when all have closed
+            _hang_up_on_close(slave)
             self.path = os.ttyname(slave)
             """Path of the terminal that a host opens."""
         finally:
@@ -127,3 +129,10 @@ class PtyLine:
         self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
     ) -> None:
         self.close()
+
+
+def _hang_up_on_close(fd: int) -> None:
+    """Switch HUPCL on, as a fresh serial port has it and a fresh pty has not: its last user's end drops DTR."""
+    settings = termios.tcgetattr(fd)
+    settings[2] |= termios.HUPCL
+    termios.tcsetattr(fd, termios.TCSANOW, settings)
