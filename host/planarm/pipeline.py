@@ -8,7 +8,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 from contextlib import closing
-from dataclasses import asdict, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -52,7 +52,7 @@ from planarm.stepping.segments import SegmentPlan, expand
 from planarm.stepping.slowing import SpeedLimit
 from planarm.streaming import options_for, record, stream
 from planarm.summary import planned_figures, seen_figures, summarise
-from planarm.trajectory.binding import report_timing
+from planarm.trajectory.binding import TimingReport, report_timing
 from planarm.trajectory.limits import Limits
 from planarm.trajectory.motion import Trajectory
 from planarm.trajectory.timing import fastest_motion
@@ -104,41 +104,61 @@ def plan_scene(scene: Scene, notice: Notice, route: Route | None = None) -> Plan
         return plan_moving(scene, margin_cm, began_s, notice)
     route = route or find_route(scene, margin_cm)
     notice("plan", 0.4)
-    limits = Limits.of(scene)
-    trajectory, path, bound_cm = fastest_motion(route.smooth, limits), route.path, route.bound_cm
-    if scene.planner.objective == "time":
-        trajectory = optimised(scene, margin_cm, trajectory, limits, notice)
-        path, bound_cm = TipPath.through(tip_curve_cm(trajectory, Arm.from_spec(scene.arm)), path.elbow), None
-    timing = report_timing(trajectory, limits)
-    jerks = jerk_limits(scene)
-    if jerks is not None:
-        trajectory = gentle_motion(scene, margin_cm - ROOM_CM, trajectory, limits, jerks)
-        timing = replace(timing, duration_s=trajectory.duration_s)
-    fastest, averaged = trajectory, jerks is not None
+    motion = motion_along(scene, route, margin_cm, notice)
     notice("plan", 0.6)
-    trajectory, train, segments = schedule(
-        # A motion with a limit of jerk is not timed anew: where a stop lacks road, the device slows down by itself.
-        scene,
-        lambda limit: timed(scene, fastest, limits, None if averaged else limit),
-    )
+    trajectory, train, segments = schedule(scene, motion.under)
     notice("plan", 0.8)
     certificate = certify(scene, trajectory, train, segments)
     notice("plan", 1.0)
     return Plan(
         scene,
         route.free_map,
-        path,
+        motion.path,
         trajectory.path,
         trajectory,
         train,
         segments,
         certificate,
         plan_ms=1e3 * (time.perf_counter() - began_s),
-        timing=timing,
+        timing=motion.timing,
         search_ms=1e3 * route.search_s,
         joint=route.joint,
-        bound_cm=bound_cm,
+        bound_cm=motion.bound_cm,
     )
+
+
+@dataclass(frozen=True, slots=True)
+class Motion:
+    """The fastest motion along a route, before it is made steps.
+
+    Attributes:
+        trajectory: it.
+        under: the same under a further limit of its speed, or as it is.
+        timing: what holds it back.
+        path: the tip's, and `bound_cm` what none is shorter than; an optimised path has another tip and no bound.
+    """
+
+    trajectory: Trajectory
+    under: Callable[[SpeedLimit | None], Trajectory]
+    timing: TimingReport
+    path: TipPath
+    bound_cm: float | None
+
+
+def motion_along(scene: Scene, route: Route, margin_cm: float, notice: Notice) -> Motion:
+    """Time a route, optimise its path for duration where that is asked for, and keep the limits of jerk."""
+    limits = Limits.of(scene)
+    trajectory, path, bound_cm = fastest_motion(route.smooth, limits), route.path, route.bound_cm
+    if scene.planner.objective == "time":
+        trajectory = optimised(scene, margin_cm, trajectory, limits, notice)
+        path, bound_cm = TipPath.through(tip_curve_cm(trajectory, Arm.from_spec(scene.arm)), path.elbow), None
+    timing, jerks = report_timing(trajectory, limits), jerk_limits(scene)
+    if jerks is None:
+        return Motion(trajectory, lambda limit: timed(scene, trajectory, limits, limit), timing, path, bound_cm)
+    # Not timed anew: where a stop lacks road, the device slows down by itself.
+    gentle = gentle_motion(scene, margin_cm - ROOM_CM, trajectory, limits, jerks)
+    timing = replace(timing, duration_s=gentle.duration_s)
+    return Motion(gentle, lambda _limit: timed(scene, gentle, limits, None), timing, path, bound_cm)
 
 
 def plan_moving(scene: Scene, margin_cm: float, began_s: float, notice: Notice) -> Plan:

@@ -10,6 +10,8 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
 PLANARM = Path(sys.executable).parent / "planarm"
+COMPILING_MS = 90_000
+"""On a machine that never ran them, what judges a run that ended is compiled first."""
 
 
 @pytest.fixture
@@ -27,7 +29,7 @@ def live(tmp_path):
 
 def shown(page, state):
     """Wait until the page says so; by a locator, because the page's policy lets nobody evaluate words."""
-    page.locator(".now", has_text=re.compile(f"^{state}$")).wait_for(timeout=20_000)
+    page.locator(".now", has_text=re.compile(f"^{state}$")).wait_for(timeout=COMPILING_MS)
 
 
 def test_a_run_is_started_held_resumed_and_ends_well(live, opened, violations):

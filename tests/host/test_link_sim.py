@@ -165,7 +165,10 @@ def test_a_reset_in_a_motion_stops_the_pins_and_is_told(line):
 
 
 def test_a_starved_queue_ends_with_the_exact_position_on_the_path(line):
-    """2,000 segments a second of two moves each are more than the line carries; whatever stops it tells the truth."""
+    """2,000 segments a second of two moves each are more than the line carries; whatever stops it tells the truth.
+
+    The line is measured before the start and the motion slowed by its figure, so steps come late, and never early.
+    """
     segments = tuple(
         Segment(2 * 8000 + (index == 999), (Move(2 * 2 + 1, 2000, 4000 << 8), Move(2 * 2, 2000, 4000 << 8)))
         for index in range(1000)
@@ -175,7 +178,7 @@ def test_a_starved_queue_ends_with_the_exact_position_on_the_path(line):
     steps = [len(rises(line, pin)) for pin in STEP_PINS]
     assert caught.value.position.moved_usteps == (steps[0], -steps[1])
     for pin, ticks, count in zip(STEP_PINS, planned_rises(segments), steps, strict=True):
-        assert np.array_equal(np.diff(rises(line, pin)), np.diff(ticks[:count]))
+        assert np.all(np.diff(rises(line, pin)) >= np.diff(ticks[:count]))
 
 
 def test_a_board_with_another_program_is_told(tmp_path):
