@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import argparse
 import json
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Generic, TypeVar
 
 from planarm.cli.progress import progress
 from planarm.cli.scenes import compile_first
@@ -17,9 +19,10 @@ if TYPE_CHECKING:
     from rich.console import Console
     from rich.table import Table
 
-    from planarm.experiments.table2 import Table2
     from planarm.experiments.text_table import TextTable
 
+Result = TypeVar("Result")
+Notice = Callable[[str, float], None]
 
 BENCHMARK_SCENES = 1000
 SAVING_SCENES = 60
@@ -52,29 +55,59 @@ def _external(options: argparse.Namespace) -> int:
     return 0
 
 
-def _mpdstar(options: argparse.Namespace) -> int:
-    from planarm.experiments.mpdstar import as_json, compare_mpdstar, findings, tables, write_mpdstar
-    from planarm.experiments.mpdstar_scenes import ASSUMPTIONS
+@dataclass(frozen=True)
+class _Paper(Generic[Result]):
+    """What a paper's comparison is made of; `written` is what --out leaves."""
 
+    compute: Callable[[Notice], Result]
+    write: Callable[[Result, Path, Notice], object]
+    as_json: Callable[[Result], object]
+    assumptions: Callable[[Result], tuple[str, ...]]
+    tables: Callable[[Result], Iterable[TextTable]]
+    findings: Callable[[Result], tuple[str, ...]]
+    written: str
+
+
+def _compare(options: argparse.Namespace, paper: _Paper[Result]) -> int:
     out = Path(options.out) if options.out else None
     if out:
         with writing(out):  # before the work is done
             out.mkdir(parents=True, exist_ok=True)
     with progress(options.json) as notice:
-        result = compare_mpdstar(options.nodes, options.scenes or SAVING_SCENES, notice)
+        result = paper.compute(notice)
         if out:
             with writing(out):
-                write_mpdstar(result, out, notice)
+                paper.write(result, out, notice)
     if options.json:
-        print(json.dumps(as_json(result)))
+        print(json.dumps(paper.as_json(result)))
         return 0
-    _print_sentences(terminal(), "What is assumed", ASSUMPTIONS)
-    for one in tables(result):
-        terminal().print(_shown(one))
-    _print_sentences(terminal(), "What is reproduced, and what is not", findings(result))
+    console = terminal()
+    _print_sentences(console, "What is assumed", paper.assumptions(result))
+    for one in paper.tables(result):
+        console.print(_shown(one))
+    _print_sentences(console, "What is reproduced, and what is not", paper.findings(result))
     if out:
-        terminal().print(f"mpdstar.json, mpdstar.md and pictures: {out}", markup=False)
+        console.print(f"{paper.written}: {out}", markup=False)
     return 0
+
+
+def _mpdstar(options: argparse.Namespace) -> int:
+    """Compute paper A's cases and tables anew."""
+    from planarm.experiments.mpdstar import as_json, compare_mpdstar, findings, tables, write_mpdstar
+    from planarm.experiments.mpdstar_scenes import ASSUMPTIONS
+
+    return _compare(
+        options,
+        _Paper(
+            lambda notice: compare_mpdstar(options.nodes, options.scenes or SAVING_SCENES, notice),
+            write_mpdstar,
+            as_json,
+            lambda _result: ASSUMPTIONS,
+            tables,
+            findings,
+            "mpdstar.json, mpdstar.md and pictures",
+        ),
+    )
 
 
 def _as_printed(options: argparse.Namespace) -> int:
@@ -93,24 +126,23 @@ def _as_printed(options: argparse.Namespace) -> int:
 
 
 def _table2(options: argparse.Namespace) -> int:
+    """Compute paper C's Table II anew."""
     from planarm.experiments.table2 import compare_table2
     from planarm.experiments.table2_folder import write_table2
-    from planarm.experiments.table2_tables import as_json
+    from planarm.experiments.table2_tables import as_json, assumptions, findings, tables
 
-    out = Path(options.out) if options.out else None
-    if out:
-        with writing(out):  # before the work is done
-            out.mkdir(parents=True, exist_ok=True)
-    with progress(options.json) as notice:
-        result = compare_table2(options.seeds, notice)
-        if out:
-            with writing(out):
-                write_table2(result, out, notice)
-    if options.json:
-        print(json.dumps(as_json(result)))
-    else:
-        _print(result, out)
-    return 0
+    return _compare(
+        options,
+        _Paper(
+            lambda notice: compare_table2(options.seeds, notice),
+            write_table2,
+            as_json,
+            assumptions,
+            tables,
+            findings,
+            "table2.json, table2.md and pictures",
+        ),
+    )
 
 
 def _random(options: argparse.Namespace) -> int:
@@ -136,38 +168,18 @@ def _moving(options: argparse.Namespace) -> int:
     from planarm.experiments.moving_folder import write_moving
     from planarm.experiments.moving_tables import as_json, assumptions, findings, tables
 
-    out = Path(options.out) if options.out else None
-    if out:
-        with writing(out):  # before the work is done
-            out.mkdir(parents=True, exist_ok=True)
-    with progress(options.json) as notice:
-        result = compare_moving(notice=notice)
-        if out:
-            with writing(out):
-                write_moving(result, out, notice)
-    if options.json:
-        print(json.dumps(as_json(result)))
-        return 0
-    console = terminal()
-    _print_sentences(console, "What is assumed", assumptions(result))
-    for one in tables(result):
-        console.print(_shown(one))
-    _print_sentences(console, "What is reproduced, and what is not", findings(result))
-    if out:
-        console.print(f"moving.json, moving.md, pictures and animations: {out}", markup=False)
-    return 0
-
-
-def _print(result: Table2, out: Path | None) -> None:
-    from planarm.experiments.table2_tables import assumptions, findings, tables
-
-    console = terminal()
-    _print_sentences(console, "What is assumed", assumptions(result))
-    for one in tables(result):
-        console.print(_shown(one))
-    _print_sentences(console, "What is reproduced, and what is not", findings(result))
-    if out:
-        console.print(f"table2.json, table2.md and pictures: {out}", markup=False)
+    return _compare(
+        options,
+        _Paper(
+            lambda notice: compare_moving(notice=notice),
+            write_moving,
+            as_json,
+            assumptions,
+            tables,
+            findings,
+            "moving.json, moving.md, pictures and animations",
+        ),
+    )
 
 
 def _shown(one: TextTable) -> Table:
