@@ -22,6 +22,10 @@ from planarm.streaming import stream
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 
 
+QUEUED_S = 1.0
+"""The device's queue holds less than this of such a slow motion, and hides a pause of the host for as long."""
+
+
 def quiet(_stage, _share):
     return None
 
@@ -101,7 +105,8 @@ def test_an_arm_that_is_held_up_goes_on_late_or_is_planned_again_and_touches_not
     assert summary["arm_touches"] == 0
     assert summary["arm_clean"]
     assert summary["tip_error_mm"] < 0.1  # it has arrived
-    assert max([summary["late_s"], *(one["late_s"] for one in summary["replans"])]) > 0.5 * for_s
+    late_s = max([summary["late_s"], *(one["late_s"] for one in summary["replans"])])
+    assert max(0.0, for_s - QUEUED_S) < late_s < for_s + 0.5
 
 
 def sooner(motion, by_s):
