@@ -10,9 +10,9 @@ from planarm.errors import DeviceFault, LinkError
 from planarm.link.released_image import released_image
 from planarm.link.sim_transport import SimTransport
 from planarm.pipeline import judge_pins, stored
-from planarm.run_folder import begin_run_folder
+from planarm.run_folder.folder import begin_run_folder
 from planarm.stepping.expand import expand
-from planarm.streaming import options_for, record, stream
+from planarm.streaming.plan_stream import options_for, record, stream
 
 SCENE = Path(__file__).parent / "scenarios" / "arm.toml"
 WAIT_S = 1.0

@@ -16,7 +16,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from planarm.analysis.step_count import Waveform, compare_steps, measure_steps
-from planarm.arm_findings import SETTLE_S, ArmFindings, judge_arm, start_tick_of
 from planarm.errors import (
     CertificateError,
     DeviceFault,
@@ -26,7 +25,6 @@ from planarm.errors import (
     TimingError,
 )
 from planarm.fastest.task import fastest_path
-from planarm.gentle import ROOM_CM, gentle_motion, jerk_limits
 from planarm.link.arm_record import ArmSetup, ArmTrace
 from planarm.link.clock import Clock
 from planarm.link.exchange import StreamResult
@@ -35,23 +33,25 @@ from planarm.link.stream import Stream, StreamProgress
 from planarm.link.transport import PinTrace, Transport, open_transport
 from planarm.model.arm import Arm
 from planarm.model.kinematics import forward
-from planarm.moving_route import find_moving_route
-from planarm.moving_run import KeptTime, Timekeeper, stream_on_time
 from planarm.plan import Findings, Plan
 from planarm.plan_file import StoredPlan
+from planarm.record.arm_findings import SETTLE_S, ArmFindings, judge_arm, start_tick_of
 from planarm.record.outcome import Outcome, Seen, StreamLog
-from planarm.route import Route, find_route
-from planarm.run_folder import begin_run_folder, finish_run_folder
+from planarm.routes.gentle import ROOM_CM, gentle_motion, jerk_limits
+from planarm.routes.moving_route import find_moving_route
+from planarm.routes.route import Route, find_route
+from planarm.run_folder.folder import begin_run_folder, finish_run_folder
+from planarm.run_folder.summary import planned_figures, seen_figures, summarise
 from planarm.scene import Scene
 from planarm.search.path import Path as TipPath
-from planarm.standing import settle_start
 from planarm.stepping.certify import certify
 from planarm.stepping.quantise import quantisation_bound_cm
 from planarm.stepping.schedule import encode, schedule
 from planarm.stepping.segments import SegmentPlan, expand
 from planarm.stepping.slowing import SpeedLimit
-from planarm.streaming import options_for, record, stream
-from planarm.summary import planned_figures, seen_figures, summarise
+from planarm.streaming.moving_run import KeptTime, Timekeeper, stream_on_time
+from planarm.streaming.plan_stream import options_for, record, stream
+from planarm.streaming.standing import settle_start
 from planarm.trajectory.binding import TimingReport, report_timing
 from planarm.trajectory.limits import Limits
 from planarm.trajectory.motion import Trajectory

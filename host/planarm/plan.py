@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from planarm.analysis.step_count import MeasuredSteps, StepComparison
-from planarm.moving_route import MovingRoute
+from planarm.routes.moving_route import MovingRoute
 from planarm.scene import Scene
 from planarm.search.joint_space import JointRoute
 from planarm.search.path import Path

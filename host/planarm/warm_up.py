@@ -14,7 +14,7 @@ from planarm.link.arm_record import ArmSetup
 from planarm.link.transport import open_transport
 from planarm.model.arm import Arm
 from planarm.pipeline import plan_scene, planning_margin_cm
-from planarm.route import find_route
+from planarm.routes.route import find_route
 from planarm.scene import parse_scene
 from planarm.smoothing.joint_spline import JointSpline
 from planarm.stepping.certify import certify

@@ -7,15 +7,15 @@ import numpy as np
 import pytest
 
 from broken_runs import SCENE, board
-from planarm.arm_moves import goto, home, jog
 from planarm.cli.main import main
 from planarm.errors import LinkError, NoPathError, SceneError, UsageError
 from planarm.link.arm_record import ArmSetup
 from planarm.link.positions import Positions
 from planarm.link.transport import open_transport
+from planarm.operations.arm_moves import goto, home, jog
 from planarm.plan_file import arm_hash
 from planarm.scene import LimitSwitchSpec, load_scene
-from planarm.standing import look, pose_of, require_standing, tell, usteps_at
+from planarm.streaming.standing import look, pose_of, require_standing, tell, usteps_at
 
 PORT = "/dev/ttyUNO"
 

@@ -4,8 +4,8 @@ import os
 
 import pytest
 
-from planarm.arrivals import Listed, Watched
 from planarm.errors import SceneError
+from planarm.operations.arrivals import Listed, Watched
 from planarm.scene import Obstacle
 from planarm.scene.arrivals import Arrival, load_arrivals
 

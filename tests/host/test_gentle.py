@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from planarm.errors import SceneError, TimingError
-from planarm.gentle import ROOM_CM, gentle_motion, jerk_limits
 from planarm.pipeline import planning_margin_cm
-from planarm.route import find_route
+from planarm.routes.gentle import ROOM_CM, gentle_motion, jerk_limits
+from planarm.routes.route import find_route
 from planarm.scene import load_scene, parse_scene
 from planarm.trajectory.check import limit_use
 from planarm.trajectory.jerk import largest_jerks

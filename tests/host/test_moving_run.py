@@ -17,10 +17,10 @@ from planarm.model.arm import Arm
 from planarm.model.kinematics import forward, inverse_2r
 from planarm.model.moving import later, shape_at
 from planarm.model.transmission import Transmission
-from planarm.moving_picture import animate
-from planarm.moving_route import find_moving_route, rest_problem
-from planarm.moving_run import FIRST_LEAD_S, REACTION_S, REPLAN_S, Timekeeper, most_late_s, stream_on_time
+from planarm.routes.moving_route import find_moving_route, rest_problem
+from planarm.run_folder.moving_picture import animate
 from planarm.scene import Obstacle, ObstacleMotion
+from planarm.streaming.moving_run import FIRST_LEAD_S, REACTION_S, REPLAN_S, Timekeeper, most_late_s, stream_on_time
 from planarm.trajectory.motion import Trajectory
 
 

@@ -12,7 +12,7 @@ from planarm.plan_file import arm_hash, load_plan, require_arm, save_plan
 from planarm.report.tables import certificate_table
 from planarm.scene import parse_scene
 from planarm.stepping.certificate import Certificate
-from planarm.streaming import stream
+from planarm.streaming.plan_stream import stream
 from planarm.warm_up import SMALL_SCENE
 
 

@@ -16,7 +16,7 @@ from planarm.record.curves import planned_curves, step_rates_hz
 from planarm.record.histograms import interval_histogram, width_histogram
 from planarm.record.outcome import Outcome, StreamSample
 from planarm.record.run_record import run_record
-from planarm.run_folder import read_record
+from planarm.run_folder.folder import read_record
 from planarm.scene import ObstacleMotion, load_scene
 
 SCENARIOS = Path(__file__).resolve().parents[1] / "scenarios"

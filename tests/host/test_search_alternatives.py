@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 from host_scenes import make_scene, oracle_clearance_cm
-from planarm.alternatives import alternatives
 from planarm.cli.main import main
 from planarm.errors import NoPathError
 from planarm.model.arm import Arm
 from planarm.pipeline import plan_scene, planning_margin_cm
+from planarm.routes.alternatives import alternatives
 from planarm.scene import JointSpaceSpec, Obstacle
 from planarm.search.alternatives import crossed_gates, gates_of, ways
 from planarm.search.joint_space import find_joint_route

@@ -11,7 +11,7 @@ from planarm.link.arm_record import ArmSetup
 from planarm.link.transport import open_transport
 from planarm.pipeline import judge_emulated_arm, judge_pins, plan_scene
 from planarm.scene import load_scene
-from planarm.streaming import stream
+from planarm.streaming.plan_stream import stream
 
 CASE1 = load_scene(Path(__file__).resolve().parents[2] / "examples" / "table1_case1.toml")
 BELT = ((1.0, 0.0), (1.0, 1.0))

@@ -16,7 +16,7 @@ from planarm.link.transport import open_transport
 from planarm.model.arm import Arm
 from planarm.model.kinematics import forward
 from planarm.model.transmission import Transmission
-from planarm.streaming import stream
+from planarm.streaming.plan_stream import stream
 
 SAID = ArmAnswers("said", (20.0, 15.0))
 START = (radians(60.0), radians(-70.0))

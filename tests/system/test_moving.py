@@ -8,16 +8,16 @@ import numpy as np
 import pytest
 
 from moving_scenes import clearance_at
-from planarm.arm_findings import judge_arm
 from planarm.errors import NoPathError, SceneError
 from planarm.link.arm_record import ArmSetup
 from planarm.link.transport import open_transport
 from planarm.model.arm import Arm
 from planarm.model.kinematics import forward
 from planarm.pipeline import judge_emulated_arm, judge_pins, plan_scene, run_scene
+from planarm.record.arm_findings import judge_arm
 from planarm.scene import ObstacleMotion, load_scene
 from planarm.stepping.certify import certify
-from planarm.streaming import stream
+from planarm.streaming.plan_stream import stream
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 

@@ -8,15 +8,15 @@ from time import perf_counter
 import numpy as np
 import pytest
 
-from planarm.arrivals import Listed
 from planarm.link.arm_record import ArmSetup
 from planarm.link.transport import open_transport
 from planarm.model.arm import Arm
 from planarm.model.collision import pose_clearance_cm
 from planarm.model.kinematics import forward
 from planarm.model.shapes import obstacle_set, shape_of
+from planarm.operations.arrivals import Listed
+from planarm.operations.replanning import GENTLE_SHARE, first_plan, judge, rest_time_s, run_live
 from planarm.pipeline import planning_margin_cm
-from planarm.replanning import GENTLE_SHARE, first_plan, judge, rest_time_s, run_live
 from planarm.scene import MechanicsSpec, Obstacle, load_scene
 from planarm.scene.arrivals import Arrival
 from planarm_wire.messages import TICKS_HZ

@@ -11,8 +11,8 @@ from planarm.link.account import account_of
 from planarm.link.journal import read_journal
 from planarm.link.position import Certainty, StreamError
 from planarm.link.stream import AT_EASE
+from planarm.operations.resume import go_on, load_run, meet_again
 from planarm.pipeline import plan_scene
-from planarm.resume import go_on, load_run, meet_again
 from planarm.scene import load_scene
 from planarm.stepping.expand import expand
 from planarm.stepping.remainder import certify_remainder, remainder, steps_left

@@ -12,7 +12,7 @@ from planarm.link.arm_record import ArmSetup
 from planarm.link.transport import open_transport
 from planarm.pipeline import judge_emulated_arm, judge_pins, plan_scene
 from planarm.scene import load_scene
-from planarm.streaming import stream
+from planarm.streaming.plan_stream import stream
 from planarm_sim.faults import KINDS, load_schedule
 
 FOLDER = Path(__file__).resolve().parents[1] / "scenarios"

@@ -29,16 +29,16 @@ from planarm.link.position import Certainty, PositionReport
 from planarm.link.released_image import released_image
 from planarm.link.stream import Stream
 from planarm.model.transmission import motor_axes
+from planarm.operations.resume import go_on, load_run
 from planarm.pipeline import plan_scene, stored
 from planarm.plan_file import save_plan
-from planarm.resume import go_on, load_run
 from planarm.scene import Scene
 from planarm.stepping.check_steps import check_gaps
 from planarm.stepping.expand import expand
 from planarm.stepping.remainder import OUT_OF_STEP_TICKS
 from planarm.stepping.train import JointSteps, StepTrain
 from planarm.stepping.windows import start_stop_ticks
-from planarm.streaming import PLAN_NAME, options_for, record, stream
+from planarm.streaming.plan_stream import PLAN_NAME, options_for, record, stream
 from planarm_wire.messages import BAUD, DIR_PINS, STEP_PINS, TICKS_HZ
 
 if TYPE_CHECKING:

@@ -43,7 +43,7 @@ def reached(options: argparse.Namespace) -> Iterator[Reached]:
 
 def tell_standing(as_json: bool, scene: Scene, usteps: tuple[int, ...], how: str | None, **more: Any) -> None:  # noqa: ANN401 - figures
     """Print where the arm stands, and by what that is known."""
-    from planarm.standing import pose_of
+    from planarm.streaming.standing import pose_of
 
     q_rad, tip_cm = pose_of(scene, usteps)
     told = {

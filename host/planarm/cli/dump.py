@@ -13,7 +13,7 @@ def execute(options: argparse.Namespace) -> int:
     """Print one line a message, and what they add up to."""
     from planarm.link.dump import Dump, Line, stream_lines
     from planarm.link.journal import MAGIC, read_journal
-    from planarm.streaming import JOURNAL_NAME
+    from planarm.streaming.plan_stream import JOURNAL_NAME
 
     path = Path(options.file)
     path = path / JOURNAL_NAME if path.is_dir() else path

@@ -12,10 +12,10 @@ from planarm.cli.scenes import tell_first_compile
 def execute(options: argparse.Namespace) -> int:
     """Plan, go, and tell where the arm stands then."""
     tell_first_compile("planarm", "planarm_sim")
-    from planarm.arm_moves import goto
     from planarm.link.position import moved_usteps
+    from planarm.operations.arm_moves import goto
     from planarm.pipeline import telling
-    from planarm.standing import look
+    from planarm.streaming.standing import look
 
     with progress(options.json) as notice, reached(options) as arm:
         standing = look(arm.transport, arm.port, arm.scene, arm.positions)

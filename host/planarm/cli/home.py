@@ -9,7 +9,7 @@ from planarm.cli.arm import reached, tell_standing
 
 def execute(options: argparse.Namespace) -> int:
     """Home, and tell where the arm stands then."""
-    from planarm.arm_moves import home
+    from planarm.operations.arm_moves import home
 
     with reached(options) as arm:
         usteps = home(arm.transport, arm.port, arm.scene, arm.positions)

@@ -14,10 +14,10 @@ from planarm.errors import UsageError
 def execute(options: argparse.Namespace) -> int:
     """Turn, and tell where the arm stands then."""
     tell_first_compile("planarm", "planarm_sim")
-    from planarm.arm_moves import jog
     from planarm.link.position import moved_usteps
+    from planarm.operations.arm_moves import jog
     from planarm.pipeline import telling
-    from planarm.standing import look
+    from planarm.streaming.standing import look
 
     with progress(options.json) as notice, reached(options) as arm:
         if not 1 <= options.joint <= len(arm.scene.joints):

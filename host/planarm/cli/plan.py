@@ -17,7 +17,7 @@ from planarm.errors import UsageError
 if TYPE_CHECKING:
     from rich.table import Table
 
-    from planarm.alternatives import Alternative
+    from planarm.routes.alternatives import Alternative
     from planarm.scene import Scene
 
 
@@ -73,8 +73,8 @@ def execute(options: argparse.Namespace) -> int:
 
 def _alternatives(scene: Scene, options: argparse.Namespace) -> list[dict[str, object]]:
     """Find the routes, print them as a table unless JSON is wanted, and return their figures."""
-    from planarm.alternatives import alternatives
     from planarm.pipeline import planning_margin_cm
+    from planarm.routes.alternatives import alternatives
 
     with progress(options.json) as notice:
         notice("routes", 0.0)

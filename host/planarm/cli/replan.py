@@ -24,10 +24,10 @@ def execute(options: argparse.Namespace) -> int:
     tell_first_compile("planarm", "planarm_sim")
     from contextlib import closing
 
-    from planarm.arrivals import Listed, Watched
     from planarm.link.arm_record import ArmSetup
     from planarm.link.transport import open_transport
-    from planarm.replanning import first_plan, run_live
+    from planarm.operations.arrivals import Listed, Watched
+    from planarm.operations.replanning import first_plan, run_live
     from planarm.scene.arrivals import load_arrivals
     from planarm.warm_up import warm_up
 

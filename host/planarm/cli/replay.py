@@ -15,7 +15,7 @@ def execute(options: argparse.Namespace) -> int:
     tell_first_compile("planarm_sim")
     from planarm.link.journal import read_journal
     from planarm.link.replay import replay
-    from planarm.streaming import JOURNAL_NAME
+    from planarm.streaming.plan_stream import JOURNAL_NAME
 
     folder = Path(options.run)
     journal = read_journal(folder / JOURNAL_NAME)

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 def execute(options: argparse.Namespace) -> int:
     """Write a run's page anew, or print a campaign's tables; which of them the folder tells."""
-    from planarm.run_folder import RECORD
+    from planarm.run_folder.folder import RECORD
 
     folder = Path(options.results)
     return _run(folder, options) if (folder / RECORD).exists() else _campaign(folder, options)
@@ -26,7 +26,7 @@ def execute(options: argparse.Namespace) -> int:
 
 def _run(folder: Path, options: argparse.Namespace) -> int:
     """Write the page of a run from its record, beside it or into --out."""
-    from planarm.run_folder import PAGE, read_record, write_page
+    from planarm.run_folder.folder import PAGE, read_record, write_page
 
     record = read_record(folder)
     page = Path(options.out or folder) / PAGE

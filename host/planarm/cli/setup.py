@@ -79,7 +79,7 @@ def moving(scene: Scene, port: str, q_rad: tuple[float, ...]) -> Iterator[Mover]
     from planarm.link.arm_record import ArmSetup
     from planarm.link.transport import open_transport
     from planarm.model.transmission import Transmission
-    from planarm.streaming import stream
+    from planarm.streaming.plan_stream import stream
 
     usteps = np.floor(Transmission.of(scene).usteps(np.array(q_rad)) + 0.5)
     setup = ArmSetup(scene, tuple(int(n) for n in usteps))

@@ -10,7 +10,7 @@ from planarm.cli.arm import reached, tell_standing
 def execute(options: argparse.Namespace) -> int:
     """Ask, and tell."""
     from planarm.link.doctor import ask_board
-    from planarm.standing import look
+    from planarm.streaming.standing import look
 
     with reached(options) as arm:
         board = ask_board(arm.transport)

@@ -9,7 +9,7 @@ from planarm.cli.arm import reached, tell_standing
 
 def execute(options: argparse.Namespace) -> int:
     """Tell the place of the tip: the task's start, or --at."""
-    from planarm.standing import tell, usteps_at
+    from planarm.streaming.standing import tell, usteps_at
 
     with reached(options) as arm:
         tip_cm = tuple(options.at) if options.at else arm.scene.task.start_cm

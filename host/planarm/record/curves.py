@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from planarm.arm_findings import ArmFindings
 from planarm.dynamics.pull_out import Drives
 from planarm.dynamics.rigid_body import RigidBody
 from planarm.model.arm import Arm
 from planarm.model.kinematics import forward
 from planarm.plan import Plan
+from planarm.record.arm_findings import ArmFindings
 from planarm.scene import Scene
 from planarm.stepping.check_torque import joint_torques_nm, motor_torque_shares
 from planarm_wire.messages import TICKS_HZ

@@ -8,8 +8,8 @@ from collections.abc import Iterator
 from itertools import pairwise
 from typing import Any, Literal, NamedTuple
 
-from planarm.arm_findings import ArmFindings
 from planarm.link.arm_record import BrokenRule, LostSteps
+from planarm.record.arm_findings import ArmFindings
 from planarm.record.outcome import Outcome
 from planarm_wire.messages import TICKS_HZ
 

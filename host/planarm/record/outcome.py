@@ -11,10 +11,10 @@ from planarm_wire.messages import TICKS_HZ
 from planarm_wire.steps import duration_ticks
 
 if TYPE_CHECKING:
-    from planarm.arm_findings import ArmFindings
     from planarm.link.stream import StreamProgress
     from planarm.link.transport import PinTrace
     from planarm.plan import Findings, Plan
+    from planarm.record.arm_findings import ArmFindings
 
 
 @dataclass(frozen=True, slots=True)

@@ -32,7 +32,7 @@ from planarm.pipeline import Notice, plan_scene, planning_margin_cm
 from planarm.plan import Plan
 from planarm.roadmap.planning import RoadmapTask, way_from
 from planarm.roadmap.recheck import first_contact
-from planarm.route import route_through
+from planarm.routes.route import route_through
 from planarm.scene import Obstacle, Scene
 from planarm.stepping.stopping import stops
 from planarm.stepping.windows import start_stop_ticks

@@ -10,7 +10,7 @@ import numpy as np
 
 from planarm.errors import NoPathError, TimingError
 from planarm.model.kinematics import ElbowSide
-from planarm.route import Route, no_path, smoothed_joint_route, tip_route
+from planarm.routes.route import Route, no_path, smoothed_joint_route, tip_route
 from planarm.scene import JointSpaceSpec, Scene
 from planarm.search.alternatives import Way, ways
 from planarm.search.diagnosis import diagnose

@@ -23,8 +23,8 @@ from planarm.model.arm import Arm
 from planarm.model.kinematics import forward
 from planarm.model.moving import later
 from planarm.model.transmission import Transmission
-from planarm.moving_route import rest_problem
 from planarm.plan import Plan
+from planarm.routes.moving_route import rest_problem
 from planarm.scene import Scene
 from planarm_wire.messages import TICKS_HZ
 

@@ -13,12 +13,12 @@ from planarm.errors import UsageError
 from planarm.model.arm import Arm
 from planarm.model.kinematics import forward
 from planarm.model.shapes import shape_of
-from planarm.moving_picture import animate
 from planarm.output import writing
 from planarm.plan_file import StoredPlan, save_plan
 from planarm.record.run_record import FORMAT, run_record
 from planarm.report import draw_joint_angles, draw_step_rates, draw_tip_error, draw_workspace
 from planarm.report.page import run_page
+from planarm.run_folder.moving_picture import animate
 from planarm_wire.messages import MIN_INTERVAL_TICKS, TICKS_HZ
 
 if TYPE_CHECKING:

@@ -26,10 +26,10 @@ from planarm.link.recording import RecordingTransport
 from planarm.link.stream import AT_EASE, Joining, StreamProgress
 from planarm.model.transmission import motor_axes
 from planarm.plan_file import StoredPlan, load_plan
-from planarm.run_folder import begin_run_folder
+from planarm.run_folder.folder import begin_run_folder
 from planarm.scene.rebuild import scene_from_mapping
 from planarm.stepping.remainder import certify_remainder, remainder, steps_left
-from planarm.streaming import JOURNAL_NAME, PLAN_NAME, options_for, record, stream
+from planarm.streaming.plan_stream import JOURNAL_NAME, PLAN_NAME, options_for, record, stream
 from planarm_wire.messages import SetPosition, State, Stop
 
 if TYPE_CHECKING:

@@ -13,9 +13,9 @@ from planarm.model.transmission import Transmission
 from planarm_wire.messages import TICKS_HZ
 
 if TYPE_CHECKING:
-    from planarm.arm_findings import ArmFindings
     from planarm.link.exchange import StreamResult
     from planarm.plan import Findings, Plan
+    from planarm.record.arm_findings import ArmFindings
 
 
 def summarise(

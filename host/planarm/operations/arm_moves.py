@@ -19,12 +19,12 @@ from planarm.pipeline import plan_scene, planning_margin_cm, timed
 from planarm.plan_file import arm_hash
 from planarm.scene import LimitSwitchSpec, Scene
 from planarm.smoothing.joint_blend import blend_poses
-from planarm.standing import Standing, pose_of
 from planarm.stepping.certify import certify
 from planarm.stepping.plan import SegmentPlan
 from planarm.stepping.schedule import schedule
 from planarm.stepping.windows import start_stop_ticks
-from planarm.streaming import options_for, stream
+from planarm.streaming.plan_stream import options_for, stream
+from planarm.streaming.standing import Standing, pose_of
 from planarm.trajectory.limits import Limits
 from planarm.trajectory.timing import fastest_motion
 from planarm.workspace.joint_proof import joint_world
