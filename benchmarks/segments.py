@@ -24,9 +24,9 @@ from rich import box
 from rich.console import Console
 from rich.table import Table
 
-from planarm.experiments.scenes import table1_scene
+from planarm.experiments.scenes import example_file, table1_scene
 from planarm.pipeline import plan_scene
-from planarm.scene import JointSpec
+from planarm.scene import JointSpec, load_scene
 from planarm.stepping.segments import Coding, compress
 from planarm.stepping.table import segment_bytes, table_of
 from planarm.stepping.train import JointSteps, StepTrain
@@ -97,10 +97,15 @@ def line_bytes(sizes: Ticks) -> int:
 
 
 def trains() -> list[tuple[str, StepTrain, tuple[JointSpec, ...]]]:
-    """Return a planned motion, and smooth motions of 2 s with top rates of 20 k and 45 k steps/s."""
-    plan = plan_scene(table1_scene(1), lambda _stage, _share: None)
-    planned = [("Table I, case 1", plan.train, plan.scene.joints), ("hard, 20 k steps/s", *reference_train())]
-    return planned + [(f"smooth, {rate_hz // 1000} k steps/s", *smooth(rate_hz)) for rate_hz in (20_000, 45_000)]
+    """Return two planned motions, a hard one, and smooth ones of 2 s with top rates of 20 k and 45 k steps/s."""
+    scenes = (("plan, 50 k on both", load_scene(example_file("fast_arm.toml"))), ("Table I, case 1", table1_scene(1)))
+    planned = []
+    for name, scene in scenes:
+        plan = plan_scene(scene, lambda _stage, _share: None)
+        planned.append((name, plan.train, plan.scene.joints))
+    return [*planned, ("hard, 20 k steps/s", *reference_train())] + [
+        (f"smooth, {rate_hz // 1000} k steps/s", *smooth(rate_hz)) for rate_hz in (20_000, 45_000)
+    ]
 
 
 def smooth(rate_hz: float, duration_s: float = 2.0) -> tuple[StepTrain, tuple[JointSpec, ...]]:
