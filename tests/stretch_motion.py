@@ -133,6 +133,8 @@ def sped_up(stretch: int, rate: int, path_ticks: int = SEGMENT_TICKS, target: in
             end -= end >> 2
         else:
             above = (end * relative >> 16) - (stretch - end)
+            if above <= 0:
+                break
             end -= above // (((ONE + 3 * relative) >> 8) + 1) << 8
     return max(end, target)
 

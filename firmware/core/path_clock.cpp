@@ -33,8 +33,8 @@ uint32_t slowed(const Change& change) {
     return end < change.target ? end : change.target;
 }
 
-// The root of s + F D s^3 = s0 by Newton's method from above: it comes down to the root and never passes it,
-// so each turn gives a lawful stretch and three are near enough.
+// The root of s + F D s^3 = s0 by Newton's method from above: it comes down to the root and does not pass it
+// but for a rounding, where it ends. So each turn gives a lawful stretch and three are near enough.
 uint32_t sped_up(const Change& change) {
     uint32_t end = change.stretch;
     for (uint8_t turn = 0; turn < 3; ++turn) {
@@ -43,9 +43,11 @@ uint32_t sped_up(const Change& change) {
             end -= end >> 2;
             continue;
         }
-        const uint32_t above = multiply_q16(end, relative) - (change.stretch - end);
+        const uint32_t growth = multiply_q16(end, relative);
+        const uint32_t gap = change.stretch - end;
+        if (growth <= gap) break;
         const uint32_t slope = ((ONE + 3 * relative) >> 8) + 1;
-        end -= (above / slope) << 8;
+        end -= ((growth - gap) / slope) << 8;
     }
     return end > change.target ? end : change.target;
 }

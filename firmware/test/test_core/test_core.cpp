@@ -12,6 +12,7 @@
 #include "frame_receiver.h"
 #include "framing.h"
 #include "hal_crc.h"
+#include "path_clock.h"
 #include "reader.h"
 #include "segment.h"
 
@@ -93,6 +94,22 @@ bool anything_stepped() {
     bool stepped = false;
     while (planarm_take_edges(&edge, 1) != 0) stepped = stepped || edge.pin != wire::ENABLE_PIN;
     return stepped;
+}
+
+// A speeding up is held against its law, s0 <= s1 + F D s1^3, in floating point.
+CASE(a_speeding_up_keeps_to_its_allowance_and_never_turns_into_a_slowing) {
+    using planarm::path_clock::ONE;
+    for (int i = 0; i < 200000; ++i) {
+        const uint32_t stretch = ONE + random_below(i % 2 == 0 ? 3 * ONE : 255 * ONE);
+        const uint32_t target = ONE + random_below(stretch - ONE + 1);
+        const uint32_t path_ticks = 1 + random_below(wire::SLICE_TICKS);
+        const uint32_t rate = planarm::path_clock::rate_value(static_cast<uint8_t>(random_below(256))) >> 1;
+        const uint32_t end = planarm::path_clock::sped_up({stretch, target, rate, path_ticks});
+        CHECK(end >= target && end <= stretch);
+        const double s1 = end / 65536.0;
+        const double lawful = s1 + rate / 4294967296.0 * path_ticks * s1 * s1 * s1;
+        CHECK(stretch / 65536.0 <= lawful * 1.0001 + 0.0001);
+    }
 }
 
 }  // namespace
