@@ -18,7 +18,7 @@ ROOT = Path(__file__).parents[1]
 sys.path[:0] = [str(ROOT / "tests"), str(ROOT / "tests" / "firmware")]
 
 from test_firmware_stretch import FAST, SEGMENT_TICKS, Player  # noqa: E402
-from test_firmware_uno import Streamer, fast  # noqa: E402
+from test_firmware_uno import Streamer, fast, restless  # noqa: E402
 
 from firmware_board import LEAD_TICKS, Board, EmulatedFirmware, Schedule, end_motion  # noqa: E402 - the tests' board
 from planarm.stepping.segments import Coding, compress  # noqa: E402
@@ -38,6 +38,7 @@ from planarm_wire.messages import (  # noqa: E402
     Segments,
     Start,
 )
+from planarm_wire.steps import duration_ticks  # noqa: E402
 from reference_motion import least_held_ticks, reference_train  # noqa: E402
 
 IMAGE = ROOT / "firmware" / "release" / "uno.hex"
@@ -62,7 +63,9 @@ def main() -> None:
         saturated("50,000 : 49,816 steps/s", 320, 1.0037, seconds),
         saturated("65,041 : 40,170 steps/s", 246, 65_041 / 40_170, seconds),
         saturated("62,500 steps/s on both", 256, 1.0, seconds),
-        streamed("65,041 : 64,801 steps/s, the host's window", 246, 1.0037),
+        streamed("65,041 : 64,801 steps/s, the host's window", fast(246, 1.0037, 4 * SLICE_TICKS, 70)),
+        streamed("random motion to 50,000 steps/s, window kept full", restless(1, 320, 1450), busy_line=True),
+        streamed("random motion to 65,041 steps/s, the host's window", restless(1, 246, 1450)),
     ]
     step, stack, interrupts = watched()
     rows += [interrupts, hold_latency(), emergency_latency(), ring()]
@@ -135,17 +138,18 @@ def saturated(name: str, interval: int, ratio: float, seconds: float) -> tuple[s
     )
 
 
-def streamed(name: str, interval: int, ratio: float) -> tuple[str, str]:
-    """Steps at constant rates, streamed within the host's window of 112 bytes."""
-    motion = end_motion(fast(interval, ratio, 4 * SLICE_TICKS, 70))
+def streamed(name: str, motion: list, *, busy_line: bool = False) -> tuple[str, str]:
+    """A motion streamed within the host's window of 112 bytes, which queries may keep full."""
+    motion = end_motion(motion)
+    length_ticks = sum(map(duration_ticks, motion))
     board = Board(EmulatedFirmware(IMAGE))
     board.get_ready()
     for segment in motion[:16]:
         board.ask(Segments(0, 0, 0, (segment,)))
     board.ask(Start(LEAD_TICKS))
-    status = Streamer(board, motion[16:], busy_line=False).run(len(motion), 4 * SLICE_TICKS * 90)
+    status = Streamer(board, motion[16:], busy_line).run(len(motion), length_ticks + TICKS_HZ)
     told = deviation(board, motion) if status.fault is Fault.NONE else f"{status.fault.name}"
-    return name, f"{told}; {status.overruns + status.ring_full} bytes lost"
+    return f"{name}, {length_ticks / TICKS_HZ:.1f} s", f"{told}; {status.overruns + status.ring_full} bytes lost"
 
 
 def watched() -> tuple[str, int, tuple[str, str]]:

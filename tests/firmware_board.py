@@ -41,7 +41,7 @@ from planarm_wire.messages import (
 )
 from planarm_wire.steps import direction, duration_ticks, expand_moves
 
-LEAD_TICKS = 20_000
+LEAD_TICKS = 60_000
 WAKE_TICKS = 340_000  # ENABLE, the mark in EEPROM, the drivers
 ANSWER_TICKS = 120_000  # the longest frame, what it asks for, and the answer, on the line one after the other
 REST = Move(0, 0, 0, 0)
@@ -211,6 +211,11 @@ class Board:
         for item in self._decoder.feed(self._firmware.take_sent()):
             assert isinstance(item, Frame), item
             self.replies.append((item.seq, decode(item.type_code, item.payload)))
+
+    def forget_replies(self) -> None:
+        """Drop what came so far, a frame that is not whole included."""
+        self.replies.clear()
+        self._decoder = FrameDecoder()
 
     def send(self, message: Message, *, seq: int | None = None) -> None:
         """Send one frame, with the next sequence number unless told otherwise."""

@@ -11,7 +11,7 @@ namespace wire {
 // Both ends must have the same.
 constexpr uint8_t PROTOCOL_VERSION = 2;
 // Of the specification without its wording.
-constexpr uint32_t SPEC_HASH = 0x801DE8A3UL;
+constexpr uint32_t SPEC_HASH = 0x16178006UL;
 
 // Ends every frame.
 constexpr uint8_t DELIMITER = 0x7E;
@@ -83,8 +83,8 @@ constexpr uint16_t SLICE_TICKS = 62500U;
 constexpr uint32_t MAX_SEGMENT_TICKS = 1073741823UL;
 // Most steps of one joint in one segment.
 constexpr uint16_t MAX_SEGMENT_STEPS = 32767U;
-// Least lead of START, 1 ms.
-constexpr uint16_t MIN_LEAD_TICKS = 16000U;
+// Least lead of START, 3.5 ms, in which the first slice of all joints is prepared.
+constexpr uint16_t MIN_LEAD_TICKS = 56000U;
 // Least high time of a step pulse, 3.5 us.
 constexpr uint8_t MIN_STEP_HIGH_TICKS = 56;
 // Least low time of a step pulse, 2.5 us.

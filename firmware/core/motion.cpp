@@ -20,10 +20,10 @@ namespace {
 // A slice is prepared this long before its start: 3.5 ms, in which the main program hands over the runs of
 // both joints at 65,000 steps/s after the longest of its other jobs. No earlier, so that a hold takes effect
 // soon.
-constexpr int32_t PREPARE_AHEAD_TICKS = 56000;
+constexpr int32_t PREPARE_AHEAD_TICKS = wire::MIN_LEAD_TICKS;
 
-// Segments must have come this long before they start: 1.25 ms.
-constexpr int32_t LATEST_ARRIVAL_TICKS = 20000;
+// Segments must have come this long before they start: 2.5 ms.
+constexpr int32_t LATEST_ARRIVAL_TICKS = 40000;
 
 // After a rest on the path the joints start this long after they are told to: their DIR pins are set by then.
 constexpr uint32_t THAW_LEAD_TICKS = 16000;

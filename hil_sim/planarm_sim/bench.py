@@ -118,6 +118,7 @@ class Bench:
         rig: the arm with its motors.
         drivers: one for each motor.
         step_cycles: the plant's step, see `Plant`.
+        propped: somebody holds the arm where it stands, until all drivers are on for the first time.
 
     Attributes:
         uno: the board.
@@ -129,7 +130,15 @@ class Bench:
 
     serial: SerialLine
 
-    def __init__(self, uno: Uno, rig: Rig, drivers: Sequence[DriverWiring], *, step_cycles: int | None = None) -> None:
+    def __init__(
+        self,
+        uno: Uno,
+        rig: Rig,
+        drivers: Sequence[DriverWiring],
+        *,
+        step_cycles: int | None = None,
+        propped: bool = False,
+    ) -> None:
         if len(drivers) != len(rig.motors):
             raise UsageError(
                 f"the rig has {len(rig.motors)} motors, {len(drivers)} drivers are given; give one for each"
@@ -137,7 +146,7 @@ class Bench:
         self.uno = uno
         self.serial = uno.serial
         self.fault_log: list[str] = []
-        self.plant = Plant(rig, uno.cycle, step_cycles=step_cycles)
+        self.plant = Plant(rig, uno.cycle, step_cycles=step_cycles, propped=propped)
         levels = [0] * (1 + max(pin.index for pin in PINS))
         for pin in PINS:
             levels[pin.index] = uno.pin(pin.name).level

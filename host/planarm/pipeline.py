@@ -50,7 +50,7 @@ from planarm.stepping.schedule import encode, schedule
 from planarm.stepping.segments import SegmentPlan, expand
 from planarm.stepping.slowing import SpeedLimit
 from planarm.streaming.moving_run import KeptTime, Timekeeper, stream_on_time
-from planarm.streaming.plan_stream import options_for, record, stream
+from planarm.streaming.plan_stream import options_for, record, stream, warn_of_release
 from planarm.streaming.standing import settle_start
 from planarm.trajectory.binding import TimingReport, report_timing
 from planarm.trajectory.limits import Limits
@@ -281,6 +281,8 @@ def run_scene(
         recorded = record(transport, out, port, scene)
         positions = Positions(default_path())
         settle_start(recorded, port, scene, plan.segments.start_usteps, positions, vouched=at_start)
+        if warn is not None:
+            warn_of_release(scene, plan.segments, warn)
         log = StreamLog(transport.clock.now_s)
         watchers, steer = [log.note, *([watch] if watch else [])], None
         if onlooker is not None:

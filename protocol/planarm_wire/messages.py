@@ -13,7 +13,7 @@ from planarm_wire.layout import END, Field
 
 PROTOCOL_VERSION: Final = 2
 """Both ends must have the same."""
-SPEC_HASH: Final = 0x801DE8A3
+SPEC_HASH: Final = 0x16178006
 """Hash of the specification without its wording."""
 DELIMITER: Final = 0x7E
 """Ends every frame."""
@@ -83,8 +83,8 @@ MAX_SEGMENT_TICKS: Final = 1_073_741_823
 """Longest segment, about 67 s."""
 MAX_SEGMENT_STEPS: Final = 32_767
 """Most steps of one joint in one segment."""
-MIN_LEAD_TICKS: Final = 16_000
-"""Least lead of START, 1 ms."""
+MIN_LEAD_TICKS: Final = 56_000
+"""Least lead of START, 3.5 ms, in which the first slice of all joints is prepared."""
 MIN_STEP_HIGH_TICKS: Final = 56
 """Least high time of a step pulse, 3.5 us."""
 MIN_STEP_LOW_TICKS: Final = 40

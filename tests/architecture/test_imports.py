@@ -146,6 +146,7 @@ ALLOWED: dict[str, set[str]] = {
         "planarm.errors",
         "planarm.scene",
         "planarm.model",
+        "planarm.dynamics",
         "planarm.stepping",
         "planarm.link",
         "planarm.routes",

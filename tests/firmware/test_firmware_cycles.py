@@ -23,7 +23,7 @@ INTERRUPTS_ON = 0x80
 
 STEP_CYCLES, ONWARD_CYCLES, REVERSED_CYCLES, IDLE_CYCLES = 78, 82, 92, 77
 MISSED_CYCLES, MISSED_ONWARD_CYCLES, MISSED_REVERSED_CYCLES = 85, 89, 99
-RECEIVE_CYCLES, OVERRUN_CYCLES, FULL_CYCLES = 40, 46, 40
+RECEIVE_CYCLES, OVERRUN_CYCLES, FULL_CYCLES = 40, 44, 40
 TRANSMIT_CYCLES = (34, 36)
 
 
@@ -143,7 +143,7 @@ def test_receive_interrupt(tracer: Tracer) -> None:
     board = play(tracer, end_motion([segment_of(200_000, run_of(2))]))
     tracer.done.clear()
     board.send(Query())
-    board.run(32_000)
+    board.run(40_000)
     assert tracer.taken(RECEIVE) == {RECEIVE_CYCLES}
     assert tracer.taken(TRANSMIT) == set(TRANSMIT_CYCLES)
     # Four bytes while interrupts are off: one more than the USART holds.

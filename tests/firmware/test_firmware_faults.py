@@ -198,7 +198,7 @@ def test_underrun(board: Board, segments: int) -> None:
     for segment in motion:
         board.ask(Segments(0, 0, 0, (segment,)))
     board.send(Start(LEAD_TICKS))
-    board.run(60_000 + 30_000 * segments)
+    board.run(LEAD_TICKS + 60_000 + 30_000 * segments)
     unasked = board.replies[-1][1]
     assert isinstance(unasked, Status)
     assert (unasked.state, unasked.fault) == (State.FAULT, Fault.UNDERRUN)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import random
 from collections import deque
 from collections.abc import Callable
 from fractions import Fraction
@@ -29,6 +30,9 @@ from planarm_wire.messages import (
     DIR_PINS,
     ENABLE_PIN,
     HOST_WINDOW_BYTES,
+    MAX_INTERVAL_TICKS,
+    MIN_DIR_SETUP_TICKS,
+    MIN_INTERVAL_TICKS,
     MIN_STEP_HIGH_TICKS,
     MIN_STEP_LOW_TICKS,
     PROTOCOL_VERSION,
@@ -207,6 +211,48 @@ def fast(interval: int, ratio: float, duration: int, count: int) -> list[Segment
     return segments
 
 
+class RestlessJoint:
+    """Speeds up, slows down, cruises at its least interval, pauses and turns round, as chance has it."""
+
+    def __init__(self, chance: random.Random, least_interval: int) -> None:
+        self.chance = chance
+        self.least_interval = least_interval
+        self.interval = 4000
+        self.rest_ticks = 10**9
+        self.positive = True
+
+    def move(self, duration: int) -> Move:
+        kind = self.chance.choice(["cruise", "cruise", "change", "change", "change", "turn", "pause"])
+        positive = self.positive ^ (kind == "turn")
+        end = self.least_interval if kind == "cruise" else self.chance.randint(self.least_interval, 6000)
+        if kind in ("turn", "pause"):
+            self.interval = self.chance.randint(self.least_interval, 2000)
+        least_gap = MIN_INTERVAL_TICKS + (MIN_DIR_SETUP_TICKS if positive is not self.positive else 0)
+        first = max(0, least_gap - self.rest_ticks) + self.chance.randint(0, 50)
+        steps = (duration - first) * 2 // (self.interval + end) - 1
+        if kind == "pause" or steps < 3:
+            self.rest_ticks += duration
+            return Move(0)
+        add = ((end - self.interval) << 16) // (steps - 1)
+        last = first + ((steps - 1) * (self.interval << 16) + (steps - 1) * (steps - 2) // 2 * add >> 16)
+        self.rest_ticks = duration - last
+        move = Move(2 * steps + positive, first, self.interval << 8, add)
+        self.positive, self.interval = positive, max(self.least_interval, self.interval + (steps - 2) * add // 65_536)
+        assert self.interval <= MAX_INTERVAL_TICKS and self.rest_ticks > 0
+        return move
+
+
+def restless(seed: int, least_interval: int, count: int) -> list[Segment]:
+    """A random motion of both joints in segments of 2 to 12 ms."""
+    chance = random.Random(seed)
+    joints = [RestlessJoint(chance, least_interval) for _ in range(2)]
+    segments = []
+    for _ in range(count):
+        duration = chance.randint(32_000, 190_000)
+        segments.append(segment_of(duration, *(joint.move(duration) for joint in joints)))
+    return segments
+
+
 def assert_every_edge(board: Board, motion: list[Segment], status: Status) -> None:
     """No fault, no byte lost in the USART, every rising edge on its tick, every pulse long enough, ledger exact."""
     assert (status.fault, status.overruns) == (Fault.NONE, 0)
@@ -246,6 +292,24 @@ def test_full_rate_with_both_joints(
         board.ask(Segments(0, 0, 0, (segment,)))
     board.ask(Start(LEAD_TICKS))
     status = Streamer(board, motion[16:], busy_line).run(len(motion), 12_000_000)
+    assert (status.ring_full, status.crc_errors) == (0, 0)
+    assert_every_edge(board, motion, status)
+
+
+@pytest.mark.parametrize(
+    ("least_interval", "busy_line"), [(320, True), (246, False)], ids=["50 k, window always full", "65 k"]
+)
+def test_a_random_motion(
+    emulated_firmware: EmulatedFirmware, least_interval: int, busy_line: bool, sized: Callable[[int, int], int]
+) -> None:
+    # About 7 ms a segment: 1.7 s, or 10 s with --full.
+    motion = end_motion(restless(1, least_interval, sized(250, 1450)))
+    board = Board(emulated_firmware)
+    board.get_ready()
+    for segment in motion[:16]:
+        board.ask(Segments(0, 0, 0, (segment,)))
+    board.ask(Start(LEAD_TICKS))
+    status = Streamer(board, motion[16:], busy_line).run(len(motion), 320_000_000)
     assert (status.ring_full, status.crc_errors) == (0, 0)
     assert_every_edge(board, motion, status)
 

@@ -144,3 +144,25 @@ def test_rigs_that_do_not_fit_are_refused():
         Rig(ARM, (Joint(),), (), (0.0, 0.0))
     with pytest.raises(UsageError, match="no inverse"):
         Rig(ARM, (Joint(),) * 2, (Motor(),) * 2, (0.0, 0.0), coupling=((1.0, 0.0), (2.0, 0.0)))
+
+
+def test_an_arm_that_somebody_holds_falls_only_after_its_drivers_let_go_of_it():
+    """Held by hand until both drivers are on, by them from then on; by nobody once they are off."""
+    motor = Motor(gear_ratio=20.0)
+    rig = Rig(ARM, (Joint(0.01), Joint(0.01)), (motor,) * 2, (0.3, 0.4), gravity_m_s2=GRAVITY)
+    phases = Plant(rig).start_phases
+    dropped, held = Plant(rig), Plant(rig, propped=True)
+    for plant in (dropped, held):
+        plant.take(np.array([[0, m, phase, 0] for m, phase in enumerate(phases)]))
+        plant.run_to(S)
+    assert np.abs(dropped.q_rad - rig.start_rad).max() > 0.5
+    assert held.q_rad == pytest.approx(rig.start_rad, abs=1e-12)
+    held.take(np.array([[S + 1000, 0, phases[0], 1], [S + 60_000, 1, phases[1], 1]]))
+    held.run_to(2 * S)
+    assert np.abs(held.q_rad - rig.start_rad).max() < 0.01, "the load angle, and what play there is"
+    again = held.snapshot()
+    held.take(np.array([[2 * S + 1000, m, phase, 0] for m, phase in enumerate(phases)]))
+    held.run_to(3 * S)
+    assert np.abs(held.q_rad - rig.start_rad).max() > 0.5
+    held.restore(again)
+    assert np.abs(held.q_rad - rig.start_rad).max() < 0.01

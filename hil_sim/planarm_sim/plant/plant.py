@@ -29,6 +29,7 @@ SAMPLE_CYCLES = 8000
 """Time between samples of the motion, 0.5 ms."""
 CHUNK_STEPS = 4000
 MOST_MARKS = 4096
+NEVER = 1 << 62
 REST_RAD_S = 1e-7
 REST_A = 1e-9
 """Where all moves slower and no current changes more, nothing will move before something is asked for."""
@@ -96,10 +97,17 @@ class Plant:
         cycle: clock cycle of 62.5 ns at which it begins.
         step_cycles: length of a step; None chooses one at which the fastest vibration is computed well.
         sample_cycles: time between samples of `motion`; 0 keeps none.
+        propped: somebody holds the arm where it stands, until every motor's driver is on for the first time.
     """
 
     def __init__(
-        self, rig: Rig, cycle: int = 0, *, step_cycles: int | None = None, sample_cycles: int = SAMPLE_CYCLES
+        self,
+        rig: Rig,
+        cycle: int = 0,
+        *,
+        step_cycles: int | None = None,
+        sample_cycles: int = SAMPLE_CYCLES,
+        propped: bool = False,
     ) -> None:
         self.rig = rig
         self._step_cycles = step_cycles or _fitting_step(rig)
@@ -118,6 +126,7 @@ class Plant:
         self._log = [np.concatenate([[cycle], self._state.y])[None]]
         self._waiting = NO_EVENTS
         self._at_rest = False
+        self._propped = propped
 
     @property
     def cycle(self) -> int:
@@ -229,9 +238,12 @@ class Plant:
 
     def _skip_rest(self, steps: int) -> int:
         """Let time pass without computing while nothing moves and nothing is asked for; returns the steps skipped."""
-        if not self._at_rest:
+        if self._propped:
+            steps = min(steps, (self._let_go() - self._cycle) // self._step_cycles)
+            self._propped = steps > 0
+        elif not self._at_rest:
             return 0
-        if len(self._waiting):
+        elif len(self._waiting):
             steps = min(steps, int(self._waiting[0, 0] - self._cycle) // self._step_cycles - 1)
         if steps <= 0:
             return 0
@@ -239,6 +251,15 @@ class Plant:
         if self._sample_cycles:
             self._log.append(np.concatenate([[self._cycle], self._state.y])[None])
         return steps
+
+    def _let_go(self) -> int:
+        """The cycle from which all drivers hold their motors, or NEVER; while propped, all they asked for waits."""
+        on = np.zeros(len(self.rig.motors), np.bool_)
+        for cycle, motor, _, is_on in self._waiting.tolist():
+            on[motor] = is_on
+            if on.all():
+                return int(cycle)
+        return NEVER
 
     def _rests_since(self, y: Floats, currents: Floats) -> bool:
         n, m = len(self.rig.links), len(self.rig.motors)
@@ -329,12 +350,12 @@ class Plant:
     def snapshot(self) -> tuple[Any, ...]:
         """Copy what decides the further run, and what was seen so far."""
         arrays = [array.copy() for array in (*self._state, self._switches.pressed)]
-        return self._cycle, arrays, list(self._log), list(self._marks), self._waiting
+        return self._cycle, arrays, list(self._log), list(self._marks), self._waiting, self._propped
 
     def restore(self, snapshot: tuple[Any, ...]) -> None:
         """Go back to a snapshot."""
         self._at_rest = False
-        self._cycle, arrays, log, marks, self._waiting = snapshot
+        self._cycle, arrays, log, marks, self._waiting, self._propped = snapshot
         for array, saved in zip((*self._state, self._switches.pressed), arrays, strict=True):
             array[...] = saved
         self._log, self._marks = list(log), list(marks)

@@ -70,7 +70,8 @@ def build_bench(uno: Uno, setup: ArmSetup) -> tuple[Bench, FaultRunner | None]:
     from planarm_sim import Bench, SimError  # noqa: PLC0415 - brings Numba, which only emulation needs
 
     try:
-        bench = Bench(uno, rig_of(setup.scene, setup.start_usteps), drivers_of(setup.scene))
+        upright = setup.scene.mechanics.gravity  # a person holds such an arm until its drivers do
+        bench = Bench(uno, rig_of(setup.scene, setup.start_usteps), drivers_of(setup.scene), propped=upright)
     except SimError as error:
         raise EmulatorError(f"{setup.scene.source}: joints.driver, joints.microsteps: {error}") from error
     return bench, _let_loose(bench, setup.faults, setup.fault_seed)

@@ -5,19 +5,23 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
+
 import planarm
+from planarm.dynamics.release import falls_on_release
 from planarm.errors import CertificateError
 from planarm.link.exchange import StreamResult, stream_plan
 from planarm.link.journal import JournalWriter
 from planarm.link.recording import RecordingTransport
 from planarm.link.stream import Joining, Stream, StreamOptions, StreamProgress
 from planarm.link.transport import Transport
-from planarm.model.transmission import motor_axes
+from planarm.model.transmission import Transmission, motor_axes
 from planarm.scene import Scene
 from planarm.stepping.certificate import Certificate
 from planarm.stepping.plan import SegmentPlan
 from planarm.stepping.windows import start_stop_ticks
 from planarm_wire.messages import SPEC_HASH
+from planarm_wire.steps import signed_steps
 
 JOURNAL_NAME = "run.journal"
 PLAN_NAME = "run.plan"
@@ -33,6 +37,17 @@ def options_for(scene: Scene, plan: SegmentPlan) -> StreamOptions:
         start_stop_ticks=tuple(start_stop_ticks(axis) for axis in motor_axes(scene.joints, scene.coupling)),
         released_spread_usteps=tuple(FULL_STEPS_RELEASED * j.microsteps for j in scene.joints) if flat else (),
     )
+
+
+def warn_of_release(scene: Scene, plan: SegmentPlan, warn: Callable[[str], None]) -> None:
+    """Say so when the arm would fall where the plan begins or ends, once its drivers let go of it."""
+    begin = np.array(plan.start_usteps)
+    moved = [[signed_steps(move) for move in segment.moves] for segment in plan.segments]
+    end = begin + np.array(moved).sum(axis=0)[: len(begin)] if moved else begin
+    arm = Transmission.of(scene)
+    falling = falls_on_release(scene, (arm.q_rad(begin), arm.q_rad(end)))
+    if falling is not None:
+        warn(str(falling))
 
 
 def record(transport: Transport, out: Path, port: str, scene: Scene) -> RecordingTransport:

@@ -1,0 +1,161 @@
+"""What outlives a reset: why the chip started, whether the drivers were enabled, and how often the EEPROM is written.
+
+ATmega328P datasheet, 11.9.1 (MCUSR) and 11.8 (watchdog). The stock boot loader clears MCUSR before it starts a program,
+so every cause is tried with the register as the chip leaves it and with nothing in it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from firmware_board import LEAD_TICKS, WAKE_TICKS, Board, EmulatedFirmware, run_of, segment_of
+from planarm_sim.cpu import registers as reg
+from planarm_sim.cpu.values import ResetCause
+from planarm_wire.messages import STEP_PINS, TICKS_HZ, WATCHDOG_MS, Enable, Reset, Segments, Start, State, Welcome
+
+BOOT_CYCLES = 600_000
+MARK_CYCLES = 4 * 54_400  # four bytes of 3.4 ms
+JUMP_TO_ITSELF = b"\xff\xcf"  # rjmp .-2
+RECORD_BYTES, RECORDS = 4, 128
+CELL_WRITES = 100_000  # ATmega328P datasheet, 8.1
+
+
+def reset_and_ask(firmware: EmulatedFirmware, board: Board, cause: ResetCause, *, hidden: bool) -> Welcome:
+    """Reset the chip, with its causes cleared as a boot loader does, and open a session."""
+    board.forget_replies()
+    firmware.uno.serial.read()
+    firmware.uno.reset(cause)
+    if hidden:
+        firmware.uno._chip._state[reg.MCUSR] = 0
+    board.run(BOOT_CYCLES)
+    board.forget_replies()  # the reset may have cut one short
+    return board.hello()
+
+
+@pytest.mark.parametrize(
+    ("cause", "shown", "behind_a_boot_loader"),
+    [
+        (ResetCause.POWER_ON, Reset.POWER_ON, Reset.POWER_ON),
+        (ResetCause.EXTERNAL, Reset.EXTERNAL, Reset.UNKNOWN),
+        (ResetCause.BROWN_OUT, Reset.BROWN_OUT, Reset.UNKNOWN),
+    ],
+)
+def test_why_the_chip_started(
+    emulated_firmware: EmulatedFirmware, cause: ResetCause, shown: Reset, behind_a_boot_loader: Reset
+) -> None:
+    board = Board(emulated_firmware)
+    assert reset_and_ask(emulated_firmware, board, cause, hidden=False).reset_cause is shown
+    assert reset_and_ask(emulated_firmware, board, cause, hidden=True).reset_cause is behind_a_boot_loader
+
+
+@pytest.mark.parametrize("hidden", [False, True], ids=["MCUSR as it is", "MCUSR cleared"])
+def test_a_main_program_that_stands_still_is_reset(emulated_firmware: EmulatedFirmware, hidden: bool) -> None:
+    board = Board(emulated_firmware)
+    board.get_ready()
+    uno, chip = emulated_firmware.uno, emulated_firmware.uno._chip
+    code = uno.flash
+    chip.pc = next(word for word in range(len(code) // 2) if code[2 * word : 2 * word + 2] == JUMP_TO_ITSELF)
+    stood_from = uno.cycle
+    released: list[int] = []
+    uno.clear_edges()
+    while not released:
+        uno.run(cycles=20_000)
+        released = [int(cycle) for cycle, level in uno.edges("D8") if level]
+        assert uno.cycle - stood_from < TICKS_HZ, "no watchdog"
+    # The watchdog's oscillator may be 10 % off; the main program had fed it less than a pass before.
+    assert (released[0] - stood_from) / TICKS_HZ == pytest.approx(2 * WATCHDOG_MS / 1000, rel=0.15)
+    if hidden:
+        chip._state[reg.MCUSR] = 0
+    board.run(BOOT_CYCLES)
+    board.replies.clear()
+    welcome = board.hello()
+    assert (welcome.reset_cause, welcome.interrupted) == (Reset.WATCHDOG, 1)
+    assert board.ask().state is State.IDLE
+
+
+def test_a_watchdog_reset_is_told_once(emulated_firmware: EmulatedFirmware) -> None:
+    board = Board(emulated_firmware)
+    assert reset_and_ask(emulated_firmware, board, ResetCause.WATCHDOG, hidden=False).reset_cause is Reset.WATCHDOG
+    assert reset_and_ask(emulated_firmware, board, ResetCause.EXTERNAL, hidden=True).reset_cause is Reset.UNKNOWN
+
+
+@pytest.mark.parametrize(
+    ("orders", "interrupted"),
+    [([], 0), ([1], 1), ([1, 0], 0), ([1, 0, 1], 1)],
+    ids=["never enabled", "enabled", "released again", "enabled again"],
+)
+def test_drivers_that_were_enabled_are_told_after_a_reset(
+    emulated_firmware: EmulatedFirmware, orders: list[int], interrupted: int
+) -> None:
+    board = Board(emulated_firmware)
+    board.hello()
+    for on in orders:
+        board.ask(Enable(on))
+        board.run(WAKE_TICKS)
+    welcome = reset_and_ask(emulated_firmware, board, ResetCause.EXTERNAL, hidden=True)
+    assert welcome.interrupted == interrupted
+    again = reset_and_ask(emulated_firmware, board, ResetCause.EXTERNAL, hidden=True)
+    assert again.interrupted == 0, "this boot enabled nothing"
+
+
+def test_no_step_is_made_before_the_mark_is_written(emulated_firmware: EmulatedFirmware) -> None:
+    # ENABLE, segments and START in one go, with the shortest lead; resets around the first step.
+    board = Board(emulated_firmware)
+    board.hello()
+    for message in (Enable(1), Segments(0, 0, 0, (segment_of(400_000, run_of(200), last=True),)), Start(LEAD_TICKS)):
+        board.send(message)
+    board.run(60_000)
+    uno = emulated_firmware.uno
+    started = uno.snapshot()
+    board.run(WAKE_TICKS)
+    first = board.rises(0)[0]
+    for moment in (first - 200, first + 10):
+        uno.restore(started)
+        uno.run(cycles=moment - uno.cycle)
+        assert bool(uno.edges(STEP_PINS[0])["level"].any()) is (moment > first)
+        welcome = reset_and_ask(emulated_firmware, board, ResetCause.EXTERNAL, hidden=True)
+        assert welcome.interrupted == 1
+
+
+def test_a_reset_while_the_mark_is_written_leaves_the_old_one_or_the_new(emulated_firmware: EmulatedFirmware) -> None:
+    board = Board(emulated_firmware)
+    board.hello()
+    board.ask()
+    uno = emulated_firmware.uno
+    idle, seq = uno.snapshot(), board.seq
+    nonces, told = set(), []
+    moments = range(2_000, 320_000, 13_700)
+    for moment in moments:
+        uno.restore(idle)
+        board.send(Enable(1), seq=seq)
+        uno.run(cycles=moment)
+        welcome = reset_and_ask(emulated_firmware, board, ResetCause.EXTERNAL, hidden=True)
+        told.append(welcome.interrupted)
+        nonces.add((welcome.boot_nonce, welcome.interrupted))
+    assert told == sorted(told) and set(told) == {0, 1}, "from some moment on the mark stands"
+    assert told[-1] == 1 and told.index(1) * 13_700 < MARK_CYCLES + 60_000
+    assert len({nonce for nonce, _ in nonces}) <= 2, "the count goes on by one or by two"
+
+
+def test_marks_wander_through_the_eeprom(emulated_firmware: EmulatedFirmware, sized: Callable[[int, int], int]) -> None:
+    # Enabled and released again and again: every record is written as often as any other.
+    board = Board(emulated_firmware)
+    board.hello()
+    memory = emulated_firmware.uno._chip.eeprom
+    writes: Counter[int] = Counter()
+    rounds = sized(70, 200)
+    before = memory.copy()
+    for turn in range(2 * rounds):
+        board.ask(Enable((turn + 1) % 2))
+        board.run(WAKE_TICKS)
+        now = memory.copy()
+        writes.update(set((np.flatnonzero(now != before) // RECORD_BYTES).tolist()))
+        before = now
+    assert sum(writes.values()) == 2 * rounds
+    assert max(writes.values()) <= math.ceil(2 * rounds / RECORDS)
+    assert RECORDS * CELL_WRITES == 12_800_000, "what hal/uno/journal.h tells"
