@@ -5,7 +5,6 @@ import re
 import shlex
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import pytest
@@ -107,19 +106,13 @@ def test_a_changed_plan_is_not_streamed(capsys, tmp_path):
     assert "SHA-256" in err
 
 
-def test_emulate_has_an_arm_around_the_board_and_tells_what_faults_did(tmp_path):
+def test_emulate_has_an_arm_around_the_board_and_tells_what_faults_did(capsys, tmp_path):
     """The released firmware keeps its drivers off until it is told otherwise: a bump moves the arm, and is told."""
     faults = tmp_path / "bump.toml"
     bump = 'kind = "mechanics.bump"\njoint = 1\ntorque_nm = 0.03\nat_s = 0.05\nfor_s = 0.1\n'
     faults.write_text(f'zero = "power_up"\n[[faults]]\n{bump}')
-    planarm = Path(sys.executable).with_name("planarm")
-    command = [planarm, "emulate", "--json", "--speed", "max", "--faults", faults]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as board:
-        assert board.stderr is not None
-        assert board.stderr.readline().startswith(("/dev/", "Compiling"))
-        time.sleep(0.5)
-        board.terminate()
-        out, _ = board.communicate()
+    code, out, _ = leave(capsys, "emulate", "--json", "--speed", "max", "--seconds", "0.3", "--faults", str(faults))
+    assert code == 0
     bench = json.loads(out)["bench"]
     assert [line.split(": ")[1] for line in bench["faults"]] == ["mechanics.bump begins", "mechanics.bump ends"]
     assert len(bench["counts"]) == 2

@@ -36,6 +36,7 @@ def execute(options: argparse.Namespace) -> int:
             watch=watch_of(options),
             speed=options.speed,
             usb=options.usb,
+            seconds=options.seconds,
             around=around,
             announce=lambda path: print(path, file=talk, flush=True),
             say=lambda text: print(f"note: {text}", file=sys.stderr, flush=True),

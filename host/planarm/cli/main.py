@@ -276,6 +276,7 @@ def _add_emulate(commands: Commands) -> None:
     command.add_argument("--symbols", metavar="ELF", help="where --profile finds the functions of an Intel HEX image")
     command.add_argument("--gdb", type=int, metavar="PORT", help="let avr-gdb attach: target remote localhost:PORT")
     command.add_argument("--speed", choices=("real", "max"), default="real", help="pace of the chip's clock")
+    command.add_argument("--seconds", type=float, metavar="S", help="emulated time to run (default: until stopped)")
     command.add_argument("--usb", choices=("16u2", "direct"), default="16u2", help="the board's USB bridge, or none")
     _add_json(command)
 
