@@ -283,7 +283,7 @@ def run_scene(
         settle_start(recorded, port, scene, plan.segments.start_usteps, positions, vouched=at_start)
         if warn is not None:
             warn_of_release(scene, plan.segments, warn)
-        log = StreamLog(transport.clock.now_s)
+        log = StreamLog()
         watchers, steer = [log.note, *([watch] if watch else [])], None
         if onlooker is not None:
             onlooker.begin(plan, transport.clock, emulated=transport.pins is not None)

@@ -19,8 +19,12 @@ def expand_moves(segment: Segment) -> tuple[tuple[int, ...], ...]:
 
 def step_ticks(move: Move) -> tuple[int, ...]:
     """Return the ticks of the move's steps, relative to its segment's start."""
-    interval, add = move.interval_q8 << 8, move.add_q16
-    return tuple(move.first_ticks + ((n * interval + n * (n - 1) // 2 * add) >> 16) for n in range(step_count(move)))
+    return tuple(step_tick(move, n) for n in range(step_count(move)))
+
+
+def step_tick(move: Move, n: int) -> int:
+    """Return the tick of the move's step n, relative to its segment's start."""
+    return move.first_ticks + ((n * (move.interval_q8 << 8) + n * (n - 1) // 2 * move.add_q16) >> 16)
 
 
 def step_count(move: Move) -> int:

@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 
 from link_model import USB_FLUSH_S, Damage, ModelLine, motion
 from planarm.errors import CertificateError, DeviceFault, LinkError, StepsDifferError
+from planarm.link.clock_sync import Span
 from planarm.link.exchange import open_session, request, stream_plan
 from planarm.link.margin import Margin, line_margin
 from planarm.link.plan_steps import planned_usteps
@@ -532,7 +533,8 @@ def test_the_remaining_time_is_the_walls_and_honest():
     late = [(at_s, left_s) for at_s, left_s in told if at_s > 0.5]
     for at_s, left_s in late:
         assert left_s == pytest.approx(3.0 * (end_s - at_s), abs=0.2)
-    progress = StreamProgress(1.0, 2.0, 5, 10, 5, (0, 0), State.HELD, 1.0, 800, 0, 0)
+    then = Span(1.0, 1.0)
+    progress = StreamProgress(1.0, 2.0, 5, 10, 5, (0, 0), State.HELD, 1.0, 800, 0, 0, then, then)
     assert remaining.after(progress) is None
     assert words_of(progress, None) == "1.00 of 2.00 s, 5 segments queued, the arm stands (held)"
     slow = replace(progress, state=State.RUNNING, rate_percent=50)

@@ -10,6 +10,7 @@ import pytest
 from link_model import ModelLine, motion
 from moving_scenes import SAMPLE_S, clearance_at, random_motion, random_moving_scene
 from planarm.errors import LinkError, NoPathError, SceneError
+from planarm.link.clock_sync import Span
 from planarm.link.exchange import stream_plan
 from planarm.link.position import Certainty, PositionReport, StreamError
 from planarm.link.stream import StreamOptions
@@ -35,8 +36,8 @@ class FakeClock:
         self.at_s = max(self.at_s, t_s)
 
 
-def reached(path_s):
-    return SimpleNamespace(path_s=path_s)
+def reached(path_s, at_s):
+    return SimpleNamespace(path_span_s=Span(path_s, path_s + 0.001), made_s=Span(at_s - 0.002, at_s))
 
 
 def test_a_motion_starts_at_the_agreed_time():
@@ -56,14 +57,32 @@ def test_a_start_that_has_passed_is_refused_before_anything_moves():
 
 
 def test_a_timekeeper_stops_a_motion_once_when_it_is_too_late():
-    clock, stops = FakeClock(), []
-    keeper = Timekeeper(clock, 8.0, 0.1)
-    stream = SimpleNamespace(stop=lambda: stops.append(clock.at_s))
-    for clock.at_s, path_s in ((8.5, 0.45), (9.0, 0.93), (9.5, 1.38), (9.6, 1.40)):
-        keeper.watch(reached(path_s))
-        keeper.steer(stream)
+    stops = []
+    keeper = Timekeeper(8.0, 0.1)
+    for at_s, path_s in ((8.5, 0.45), (9.0, 0.93), (9.5, 1.38), (9.6, 1.40)):
+        keeper.watch(reached(path_s, at_s))
+        keeper.steer(SimpleNamespace(stop=lambda at_s=at_s: stops.append(at_s)))
     assert stops == [9.5]
     assert keeper.late_s == pytest.approx(0.2)
+
+
+def test_a_timekeeper_slows_an_arm_down_that_is_surely_ahead_until_it_is_not():
+    orders = []
+    keeper = Timekeeper(8.0, 0.1)
+    for at_s, path_s in (
+        (7.6, 0.0),
+        (8.5, 0.4995),
+        (9.0, 1.0005),
+        (9.5, 1.502),
+        (9.6, 1.6005),
+        (9.7, 1.699),
+        (9.8, 1.799),
+    ):
+        keeper.watch(reached(path_s, at_s))
+        keeper.steer(SimpleNamespace(override=lambda percent, at_s=at_s: orders.append((at_s, percent))))
+    assert orders == [(9.5, 98), (9.7, 100)]
+    assert keeper.early_s == pytest.approx(0.002)
+    assert not keeper.stopping
 
 
 def test_later_is_the_same_scene_seen_from_then_on():
@@ -138,7 +157,7 @@ def late_once(clock, error):
             clock.at_s += 5.0
             return "arrived"
         clock.at_s = keeper.start_at_s + 2.9
-        keeper.watch(reached(2.0))
+        keeper.watch(reached(2.0, clock.at_s))
         keeper.steer(SimpleNamespace(stop=lambda: None))
         clock.at_s += 0.1
         raise error

@@ -64,6 +64,7 @@ class _Outstanding:
     frame: bytes
     room: int
     sent_s: float
+    first_sent_s: float
     first: bool = True  # never sent again, so its round trip can be measured
 
 
@@ -76,6 +77,8 @@ class GoBackN:
         self.bytes_in_flight = 0
         self.room_in_flight = 0
         self.counters = ArqCounters()
+        self.answered_s: float | None = None
+        """When the newest acknowledged frame was first sent: every later reply was made after that."""
         self._outstanding: deque[_Outstanding] = deque()
         self._smoothed_s: float | None = None
         self._least_s = 0.0
@@ -108,7 +111,7 @@ class GoBackN:
             raise ValueError(f"{len(frame)} bytes do not fit: {self.bytes_in_flight} of {self.window_bytes} in flight")
         if not self._outstanding:
             self._timer_s = now_s
-        self._outstanding.append(_Outstanding(frame, room, now_s))
+        self._outstanding.append(_Outstanding(frame, room, now_s, now_s))
         self.bytes_in_flight += len(frame)
         self.room_in_flight += room
         self.next_seq = (self.next_seq + 1) % _SEQUENCE
@@ -130,6 +133,7 @@ class GoBackN:
             newest = self._outstanding.popleft()
             self.bytes_in_flight -= len(newest.frame)
             self.room_in_flight -= newest.room
+        self.answered_s = newest.first_sent_s
         if newest.first:
             self._measure(now_s - newest.sent_s)
         self._timer_s = now_s

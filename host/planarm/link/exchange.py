@@ -9,6 +9,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from planarm.errors import DeviceFault, LinkError
+from planarm.link.clock_sync import ClockReading, Span
 from planarm.link.knock import ask_expected
 from planarm.link.position import Known, Meeting, PositionReport, StreamError, StreamFault, judge
 from planarm.link.session import Session, SessionLimits, fault_words
@@ -52,6 +53,10 @@ class StreamResult:
     """Fewest segments seen in the device's queue while more were to come."""
     cleared_fault: Fault
     """Fault of an earlier motion that was cleared first."""
+    began_s: Span | None
+    """When the first segment started; None when it was not this session that started it."""
+    board_clock: ClockReading | None
+    """What the session learnt of the device's clock."""
 
 
 def stream_plan(
@@ -235,4 +240,6 @@ def _result(session: Session, now_s: float, began_s: float, stream: Stream | Non
         path_clock_percent=stream.path_clock_percent if stream else PERCENT,
         least_queued=stream.least_queued if stream else 0,
         cleared_fault=stream.cleared_fault if stream else Fault.NONE,
+        began_s=stream.began_s if stream else None,
+        board_clock=session.board_clock.reading(),
     )

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 from planarm.errors import DeviceFault, LinkError
 from planarm.link.arq import Ack, ArqCounters, GoBackN
+from planarm.link.clock_sync import ClockSync, Span
 from planarm_wire.codec import decode, encode, encoded_bytes
 from planarm_wire.errors import WireError
 from planarm_wire.framing import Frame, FrameDecoder, encode_frame
@@ -68,6 +69,7 @@ class LineCounters:
 class Session:
     """One session with one boot of the device.
 
+    `status` is the device's last, read at `status_s` and made within `made_s`, by the device's clock `board_clock`.
     `guarded` is set by the owner once the drivers are enabled: from then on an idle device can only be a restarted one,
     and a latched fault is raised as DeviceFault.
     """
@@ -78,6 +80,8 @@ class Session:
         self.welcome: Welcome | None = None
         self.status: Status | None = None
         self.status_s = now_s
+        self.made_s = Span(now_s, now_s)
+        self.board_clock = ClockSync()
         self.line = LineCounters()
         self.bytes_sent = 0
         self.guarded = False
@@ -259,6 +263,8 @@ class Session:
         self._output += again
         self._count_line_errors(status)
         self.status, self.status_s = status, now_s
+        if self._arq.answered_s is not None:
+            self.made_s = self.board_clock.take(self._arq.answered_s, status.mcu_ticks, now_s)
         self._raise_fault(status)
 
     def _count_line_errors(self, status: Status) -> None:

@@ -13,8 +13,10 @@ from collections.abc import Callable, Sequence
 from itertools import accumulate
 
 from planarm.errors import CertificateError, LinkError, StepsDifferError
+from planarm.link.clock_sync import Span
 from planarm.link.margin import line_margin
 from planarm.link.packing import Packer
+from planarm.link.path_time import PathTime
 from planarm.link.plan_steps import PlanSteps
 from planarm.link.position import executed_since, moved_usteps
 from planarm.link.session import Session
@@ -70,6 +72,7 @@ class Stream:
         self.ledger_before: Ledger | None = None
         self.cleared_fault = Fault.NONE
         self.started_s = 0.0
+        self.began_s: Span | None = None
         self.least_queued = len(segments)
         self.stopped = False
         self.unasked_holds = 0
@@ -77,11 +80,13 @@ class Stream:
         self._warn = warn
         self._filling_since_s = 0.0
         self._filled_from_bytes = 0
+        self._start_sent_s, self._lead_ticks_sent = 0.0, 0
         self._session = session
         self._segments = tuple(segments)
         self._options = options or StreamOptions()
         self._on_progress = on_progress
         self._ends_ticks = tuple(accumulate((duration_ticks(segment) for segment in segments), initial=0))
+        self._path_time = PathTime(self._segments, self._ends_ticks, self.steps)
         self._seen: Status | None = None
         self._executed = 0
         self._executed_s = 0.0
@@ -223,7 +228,8 @@ class Stream:
         self._send_segments(now_s)
         if self._session.idle:  # the queue is full, or the whole plan is in it
             self._set_path_clock(now_s)
-            self._session.send(Start(self._lead_ticks(now_s)), now_s)
+            self._start_sent_s, self._lead_ticks_sent = now_s, self._lead_ticks(now_s)
+            self._session.send(Start(self._lead_ticks_sent), now_s)
             self.phase = Phase.STARTING
 
     def _set_path_clock(self, now_s: float) -> None:
@@ -251,6 +257,8 @@ class Stream:
     def _begin_running(self, now_s: float) -> None:
         if self._session.idle:
             self.started_s = self._executed_s = now_s
+            lead_s = self._lead_ticks_sent / TICKS_HZ
+            self.began_s = Span(self._start_sent_s + lead_s, self._session.made_s.most + lead_s)
             self.phase = Phase.RUNNING
 
     def _run(self, now_s: float) -> None:
@@ -348,18 +356,21 @@ class Stream:
 
     def _progress(self, status: Status, queued: int, now_s: float) -> StreamProgress:
         assert self.ledger_before is not None
+        moved = moved_usteps(self.ledger_before, status.ledger)
         return StreamProgress(
             path_s=self._ends_ticks[self._executed] / TICKS_HZ,
             total_s=self._ends_ticks[-1] / TICKS_HZ,
             executed_segments=self._executed,
             total_segments=len(self._segments),
             queued_segments=queued,
-            moved_usteps=moved_usteps(self.ledger_before, status.ledger),
+            moved_usteps=moved,
             state=status.state,
             at_s=now_s,
             free_bytes=status.free_bytes,
             retransmissions=self._session.arq_counters.retransmissions,
             rate_percent=status.rate_percent,
+            made_s=self._session.made_s,
+            path_span_s=self._path_time.span_s(self._executed, moved),
         )
 
     def _stall_due_s(self) -> float:

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import Enum, auto
 
+from planarm.link.clock_sync import Span
 from planarm_wire.messages import DEFAULT_WAKE_TICKS, Config, Ledger, PinMap, State
 from planarm_wire.rates import Allowance
 
@@ -54,6 +55,10 @@ class StreamProgress:
     """Frames sent again so far."""
     rate_percent: int
     """Of the path clock, as the device has it now; 0 while it stands still."""
+    made_s: Span
+    """When the status was made, on the transport's clock: surely within these."""
+    path_span_s: Span
+    """Where on the path the motion was then: after the last step made, before the next."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import accumulate
 from typing import TYPE_CHECKING, Any
@@ -22,8 +22,8 @@ class StreamSample:
     """What the device told at one moment.
 
     Attributes:
-        at_s: the moment on the transport's clock.
-        path_s: path time of the segments executed.
+        at_s: the moment on the transport's clock, by the clocks' synchronisation: not later.
+        path_s: path time by then, not earlier.
         executed_segments: their number.
         queued_segments: segments sent and not yet executed.
         state: what the device was doing, in the protocol's word.
@@ -39,16 +39,14 @@ class StreamSample:
 class StreamLog:
     """Keeps what the device tells while a plan is streamed."""
 
-    def __init__(self, now_s: Callable[[], float]) -> None:
+    def __init__(self) -> None:
         self.samples: list[StreamSample] = []
-        self._now_s = now_s
 
     def note(self, told: StreamProgress) -> None:
-        """Keep one progress message, with the clock's time."""
+        """Keep one progress message."""
+        at_s, path_s = told.made_s.most, told.path_span_s.least
         self.samples.append(
-            StreamSample(
-                self._now_s(), told.path_s, told.executed_segments, told.queued_segments, told.state.name.lower()
-            )
+            StreamSample(at_s, path_s, told.executed_segments, told.queued_segments, told.state.name.lower())
         )
 
 
@@ -95,8 +93,8 @@ class Outcome:
     def start_s(self) -> float | None:
         """The time of the plan's zero on the transport's clock; None when nothing was executed.
 
-        An emulator's clock is the board's. On a real port the zero is bracketed by what the device told: a status
-        comes some milliseconds after the segment's end that it tells, so the earliest is nearest.
+        An emulator's clock is the board's. On a real port the zero is bounded by every status: it was made not later
+        than a moment and not earlier on the path than a place, so the earliest is nearest.
         """
         if self.seen.start_tick:
             return self.seen.start_tick / TICKS_HZ

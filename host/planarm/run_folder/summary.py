@@ -35,10 +35,24 @@ def summarise(
         **planned_figures(plan),
         "bytes_sent": streamed.bytes_sent,
         "retransmissions": streamed.retransmissions,
+        **_clock_figures(streamed),
         "net_usteps_by_ledger": list(by_ledger_usteps),
         "net_usteps": list(net_usteps),
         **tip_figures(plan, net_usteps),
         **seen_figures(findings, arm),
+    }
+
+
+def _clock_figures(streamed: StreamResult) -> dict[str, float]:
+    """Return what was learnt of the board's clock: its drift, how sure, and how surely moments and start are known."""
+    clock, began_s = streamed.board_clock, streamed.began_s
+    if clock is None or began_s is None:
+        return {}
+    return {
+        "board_clock_drift_ppm": round(clock.drift_ppm.middle, 1),
+        "board_clock_drift_plus_minus_ppm": round(clock.drift_ppm.plus_minus, 1),
+        "board_clock_plus_minus_ms": round(1e3 * clock.moment_s, 3),
+        "start_plus_minus_ms": round(1e3 * began_s.plus_minus, 3),
     }
 
 

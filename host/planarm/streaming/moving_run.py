@@ -37,33 +37,50 @@ REPLAN_S = 1.0
 REACTION_S = 0.03
 """From being late to slowing down: a status may be 20 ms old and the order takes a few more."""
 
+EARLY_S = 0.001
+BRAKING_PERCENT, FULL_PERCENT = 98, 100
+"""How far ahead the arm may surely be before its path clock is slowed down, and to what: a resonator may be 0.5 % fast,
+so two hundredths catch up; and a plan has no margin for what comes early."""
+
 MOST_REPLANS = 20
 
 
 class Timekeeper:
-    """Holds the device's ledger against the plan's clock, and stops the motion when it is too far behind.
+    """Holds the device's ledger against the plan's clock: stops the motion when it is too far behind, brakes it ahead.
 
-    The running segment began at a known path time, and segments last milliseconds, so every status tells how late the
-    arm is at most.
+    The ledger tells between which two steps the arm was, the clocks' synchronisation between which two moments that was
+    so, and both together how late it is at most and how early at least. A board's clock that runs fast brings the arm
+    ahead of its appointments; then its path clock is told to run a little slower, until that is no longer sure.
     """
 
-    def __init__(self, clock: Clock, start_at_s: float, most_late_s: float) -> None:
+    def __init__(self, start_at_s: float, most_late_s: float) -> None:
         self.start_at_s = start_at_s
         """When the motion is due to start."""
         self.late_s = 0.0
+        self.early_s = 0.0
+        """The most by which it was surely ahead."""
         self.stopping = False
-        self._clock = clock
         self._most_late_s = most_late_s
+        self._early_now_s = 0.0
+        self._percent = FULL_PERCENT
 
     def watch(self, told: StreamProgress) -> None:
         """Take note of a status."""
-        self.late_s = max(self.late_s, self._clock.now_s() - self.start_at_s - told.path_s)
+        late_s = told.made_s.most - self.start_at_s - told.path_span_s.least
+        self.late_s = max(self.late_s, late_s)
+        begun = told.path_span_s.least > 0.0
+        self._early_now_s = -late_s if begun else 0.0
+        self.early_s = max(self.early_s, self._early_now_s)
 
     def steer(self, stream: Stream) -> None:
-        """Stop the motion along its path, once, when it is too late."""
+        """Stop the motion along its path, once, when it is too late; slow its path clock down while it is ahead."""
         if self.late_s > self._most_late_s and not self.stopping:
             self.stopping = True
             stream.stop()
+        percent = BRAKING_PERCENT if self._early_now_s > EARLY_S else FULL_PERCENT
+        if percent != self._percent and not self.stopping and (percent != FULL_PERCENT or self._early_now_s <= 0.0):
+            self._percent = percent
+            stream.override(percent)
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,6 +109,8 @@ class KeptTime:
     """Their time 0 on the transport's clock."""
     late_s: float
     """How far behind the last plan was, at most."""
+    early_s: float
+    """How far ahead of it the arm surely was, at most."""
     replans: tuple[Replan, ...]
 
     @property
@@ -107,7 +126,8 @@ class KeptTime:
 
     def figures(self) -> dict[str, Any]:
         """Return what it took, for the summary."""
-        return {"late_s": round(self.late_s, 6), "replans": [asdict(replan) for replan in self.replans]}
+        late_s, early_s = round(self.late_s, 6), round(self.early_s, 6)
+        return {"late_s": late_s, "early_s": early_s, "replans": [asdict(replan) for replan in self.replans]}
 
 
 Streamer = Callable[[Plan, Timekeeper], StreamResult]
@@ -141,7 +161,7 @@ def stream_on_time(plan: Plan, clock: Clock, streamer: Streamer, plan_again: Cal
     first, start_s = plan.scene, zero_s
     replans: list[Replan] = []
     while True:
-        keeper = Timekeeper(clock, start_s, most_late_s(plan))
+        keeper = Timekeeper(start_s, most_late_s(plan))
         try:
             streamed = streamer(plan, keeper)
         except StreamError as error:
@@ -158,7 +178,7 @@ def stream_on_time(plan: Plan, clock: Clock, streamer: Streamer, plan_again: Cal
             replans.append(Replan(now_s, keeper.late_s, now_s + REPLAN_S))
             start_s = zero_s + now_s + REPLAN_S
         else:
-            return KeptTime(streamed, plan, first, zero_s, keeper.late_s, tuple(replans))
+            return KeptTime(streamed, plan, first, zero_s, keeper.late_s, keeper.early_s, tuple(replans))
 
 
 def _onwards(resting: Scene, departing: Scene, plan_again: Callable[[Scene], Plan], stopped: StreamError) -> Plan:
