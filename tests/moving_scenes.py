@@ -1,6 +1,7 @@
 """Scenes with moving obstacles and a plain account of them; shapely is the independent oracle."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 
@@ -8,8 +9,9 @@ from host_scenes import make_scene, oracle_distance_cm
 from planarm.model.arm import Arm
 from planarm.model.kinematics import forward
 from planarm.model.moving import shape_at
-from planarm.scene import MovingSpec, Obstacle, ObstacleMotion
+from planarm.scene import MovingSpec, Obstacle, ObstacleMotion, load_scene
 
+EXAMPLES = Path(__file__).resolve().parents[1] / "examples"
 SAMPLE_S = 0.5
 QUARTER = ((0.0, 2.0 * np.pi), (-0.5 * np.pi, 0.5 * np.pi))
 
@@ -67,3 +69,18 @@ def clearance_at(scene, q_rad, time_s):
     links = [(joints[i], joints[i + 1]) for i in range(len(joints) - 1)]
     shapes = [shape_at(obstacle, time_s) for obstacle in scene.obstacles]
     return min((oracle_distance_cm(link, shape) for link in links for shape in shapes), default=np.inf)
+
+
+def quiet(_stage, _share):
+    return None
+
+
+def environment(number, *, faster=1.0, smoothing="none"):
+    """An example, its clock run faster: obstacles and samples alike."""
+    scene = load_scene(EXAMPLES / f"moving_env{number}.toml")
+    moving = replace(scene.moving, sample_s=scene.moving.sample_s / faster, smoothing=smoothing)
+    obstacles = tuple(
+        replace(o, motion=replace(o.motion, times_s=tuple(t / faster for t in o.motion.times_s)))
+        for o in scene.obstacles
+    )
+    return replace(scene, moving=moving, obstacles=obstacles)

@@ -333,7 +333,7 @@ def carry_out(
 
         options = replace(options_for(now.scene, now.segments), start_at_s=keeper.start_at_s)
         tell = telling(notice, keeper.watch, *watch)
-        return stream(now.segments, now.certificate, transport, tell, options, steer=steered)
+        return stream(now.segments, now.certificate, transport, tell, options, steer=steered, limits=keeper.limits)
 
     kept = stream_on_time(plan, transport.clock, on_time, lambda scene: plan_scene(scene, notice))
     return kept.plan, kept.streamed, kept

@@ -7,13 +7,17 @@ from __future__ import annotations
 
 import sys
 from contextlib import closing
+from dataclasses import replace
 
 import numpy as np
 
 from planarm.link.arm_record import ArmSetup
 from planarm.link.transport import open_transport
 from planarm.model.arm import Arm
+from planarm.model.kinematics import forward
+from planarm.model.moving import later
 from planarm.pipeline import plan_scene, planning_margin_cm
+from planarm.routes.moving_route import find_moving_route, rest_touch
 from planarm.routes.route import find_route
 from planarm.scene import parse_scene
 from planarm.smoothing.joint_spline import JointSpline
@@ -71,11 +75,32 @@ POSES_RAD = ((0.0, -0.6), (0.5, -1.2), (1.0, -0.8))
 ON_ROADMAP = '[planner]\nalgorithm = "mpd_star_lite"\n[roadmap]\nnodes = 200\n'
 
 
-def warm_up(*, on_roadmap: bool = False) -> None:
+AMONG_MOVING = """
+[moving]
+sample_s = 0.5
+samples = 24
+smoothing = "pso"
+via_points = 1
+[[obstacles]]
+shape = "circle"
+center_cm = [4.5, 4.5]
+diameter_cm = 0.5
+[obstacles.motion]
+path = "straight"
+by_cm = [-2, 0.5]
+motion_samples = 20
+"""
+"""A circle that crosses the way, after the small scene's obstacles, which rest."""
+
+
+def warm_up(*, on_roadmap: bool = False, moving: bool = False) -> None:
     """Plan the small scene; the first time on a machine this compiles, later it loads from the cache.
 
-    The kernels of planners on a roadmap are not wanted by other scenes, so they are asked for.
+    The kernels of planners on a roadmap, and those among moving obstacles, are not wanted by other scenes, so they are
+    asked for.
     """
+    if moving:
+        warm_up_moving()
     for planner in (*PLANNERS, *((ON_ROADMAP,) if on_roadmap else ())):
         plan_scene(parse_scene(SMALL_SCENE + planner, "warm-up"), lambda _stage, _share: None)
 
@@ -105,6 +130,20 @@ def warm_up_emulator() -> None:
     with closing(open_transport("sim://", scene.link.baud, ArmSetup(scene, (0, 0)))) as transport:
         if transport.arm:
             transport.arm.settle(MOMENT_S)
+
+
+def warm_up_moving() -> None:
+    """Plan among moving obstacles, with all that is told about it, and once more from where an arm was stopped."""
+    arm_and_rest, task = SMALL_SCENE.split("[task]")
+    scene = parse_scene(f"{arm_and_rest}{AMONG_MOVING}[task]{task}", "warm-up")
+    plan = plan_scene(scene, lambda _stage, _share: None)
+    stopped_s = 0.4 * plan.trajectory.duration_s
+    (rest_rad,) = plan.trajectory.sample(np.array([stopped_s]))[0]
+    x, y = forward(Arm.from_spec(scene.arm), rest_rad)[-1]
+    start = replace(scene.task, start_cm=(float(x), float(y)), start_rad=tuple(map(float, rest_rad)))
+    resting = later(replace(scene, task=start), stopped_s)
+    rest_touch(resting, MOMENT_S)
+    find_moving_route(resting, planning_margin_cm(resting))
 
 
 PARTS = {"search": warm_up_search, "motion": warm_up_motion, "emulator": warm_up_emulator}

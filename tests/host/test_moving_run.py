@@ -12,16 +12,24 @@ from moving_scenes import SAMPLE_S, clearance_at, random_motion, random_moving_s
 from planarm.errors import LinkError, NoPathError, SceneError
 from planarm.link.clock_sync import Span
 from planarm.link.exchange import stream_plan
-from planarm.link.position import Certainty, PositionReport, StreamError
+from planarm.link.position import Certainty, MissedStartError, PositionReport, StreamError
 from planarm.link.stream import StreamOptions
 from planarm.model.arm import Arm
 from planarm.model.kinematics import forward, inverse_2r
 from planarm.model.moving import later, shape_at
 from planarm.model.transmission import Transmission
-from planarm.routes.moving_route import find_moving_route, rest_problem
+from planarm.routes.moving_route import find_moving_route, rest_touch
 from planarm.run_folder.moving_picture import animate
 from planarm.scene import Obstacle, ObstacleMotion
-from planarm.streaming.moving_run import FIRST_LEAD_S, REACTION_S, REPLAN_S, Timekeeper, most_late_s, stream_on_time
+from planarm.streaming.moving_run import (
+    FIRST_LEAD_S,
+    LONGER,
+    REACTION_S,
+    REPLAN_S,
+    Room,
+    Timekeeper,
+    stream_on_time,
+)
 from planarm.trajectory.motion import Trajectory
 
 
@@ -37,7 +45,7 @@ class FakeClock:
 
 
 def reached(path_s, at_s):
-    return SimpleNamespace(path_span_s=Span(path_s, path_s + 0.001), made_s=Span(at_s - 0.002, at_s))
+    return SimpleNamespace(path_span_s=Span(path_s, path_s + 0.001), made_s=Span(at_s - 0.002, at_s), at_s=at_s)
 
 
 def test_a_motion_starts_at_the_agreed_time():
@@ -57,32 +65,14 @@ def test_a_start_that_has_passed_is_refused_before_anything_moves():
 
 
 def test_a_timekeeper_stops_a_motion_once_when_it_is_too_late():
-    stops = []
-    keeper = Timekeeper(8.0, 0.1)
-    for at_s, path_s in ((8.5, 0.45), (9.0, 0.93), (9.5, 1.38), (9.6, 1.40)):
-        keeper.watch(reached(path_s, at_s))
-        keeper.steer(SimpleNamespace(stop=lambda at_s=at_s: stops.append(at_s)))
+    clock, stops = FakeClock(), []
+    keeper = Timekeeper(clock, 8.0, Room(0.1 + REACTION_S, 0.0))
+    stream = SimpleNamespace(stop=lambda: stops.append(clock.at_s), round_trip_s=0.01)
+    for clock.at_s, path_s in ((8.5, 0.45), (9.0, 0.93), (9.5, 1.38), (9.6, 1.40)):
+        keeper.watch(reached(path_s, clock.at_s))
+        keeper.steer(stream)
     assert stops == [9.5]
     assert keeper.late_s == pytest.approx(0.2)
-
-
-def test_a_timekeeper_slows_an_arm_down_that_is_surely_ahead_until_it_is_not():
-    orders = []
-    keeper = Timekeeper(8.0, 0.1)
-    for at_s, path_s in (
-        (7.6, 0.0),
-        (8.5, 0.4995),
-        (9.0, 1.0005),
-        (9.5, 1.502),
-        (9.6, 1.6005),
-        (9.7, 1.699),
-        (9.8, 1.799),
-    ):
-        keeper.watch(reached(path_s, at_s))
-        keeper.steer(SimpleNamespace(override=lambda percent, at_s=at_s: orders.append((at_s, percent))))
-    assert orders == [(9.5, 98), (9.7, 100)]
-    assert keeper.early_s == pytest.approx(0.002)
-    assert not keeper.stopping
 
 
 def test_later_is_the_same_scene_seen_from_then_on():
@@ -143,8 +133,8 @@ def a_plan(scene, margin_s=0.5):
 
 
 def test_the_arm_may_be_late_by_the_margin_less_reaction_and_the_longest_stop():
-    assert most_late_s(a_plan(None)) == pytest.approx(0.5 - REACTION_S - 2 * 0.01)
-    assert most_late_s(a_plan(None, margin_s=0.0)) == REACTION_S
+    assert Room.of(a_plan(None)).most_late_s() == pytest.approx(0.5 - REACTION_S - 2 * 0.01)
+    assert Room.of(a_plan(None, margin_s=0.0)).most_late_s() == REACTION_S
 
 
 def late_once(clock, error):
@@ -158,7 +148,7 @@ def late_once(clock, error):
             return "arrived"
         clock.at_s = keeper.start_at_s + 2.9
         keeper.watch(reached(2.0, clock.at_s))
-        keeper.steer(SimpleNamespace(stop=lambda: None))
+        keeper.steer(SimpleNamespace(stop=lambda: None, round_trip_s=0.01))
         clock.at_s += 0.1
         raise error
 
@@ -208,15 +198,68 @@ def test_when_nothing_leads_on_the_error_says_what_touches_the_arm_and_when():
     assert notes[1] == "no motion leads on: none"
     # It touches when its edge and the margin reach the tip: (20 - 1 - 0.4) cm at 4 cm/s, told to 0.05 s.
     assert notes[2].startswith("obstacles[1] touches the resting arm after ")
-    assert 4.59 <= float(notes[2].split()[-2]) <= 4.66
+    assert 4.59 <= float(notes[2].split()[6].rstrip("s,")) <= 4.66
+    assert notes[2].endswith(" s on the obstacles' clock")
+
+
+def test_a_missed_start_is_put_off_and_planned_for_from_where_the_arm_rests():
+    scene, clock = replace(random_moving_scene(np.random.default_rng(1)), obstacles=()), FakeClock()
+    starts, asked = [], []
+
+    def streamer(_plan, keeper):
+        starts.append(keeper.start_at_s)
+        if len(starts) > 2:
+            return "arrived"
+        clock.at_s = keeper.start_at_s + 0.3
+        missed = MissedStartError(keeper.start_at_s, clock.at_s, 0.01)
+        raise StreamError(str(missed), position(moved=(0, 0))) from missed
+
+    def plan_again(then):
+        asked.append(then)
+        return a_plan(then)
+
+    kept = stream_on_time(a_plan(scene), clock, streamer, plan_again)
+    assert kept.streamed == "arrived"
+    assert [one.why for one in kept.replans] == ["missed start", "missed start"]
+    leads = [one.depart_s - one.at_s for one in kept.replans]
+    assert leads == pytest.approx([REPLAN_S + LONGER * 0.31, REPLAN_S + 2 * LONGER * 0.31])
+    assert starts[1:] == pytest.approx([kept.zero_s + one.depart_s for one in kept.replans])
+    assert asked[0].task.start_rad == pytest.approx(Transmission.of(scene).q_rad((100, 200)))
+
+
+def test_a_line_that_fails_tells_what_touches_the_arm_wherever_it_may_rest():
+    """Told last after 3 of 9 segments; a disc comes to where it would rest after 5 of them."""
+    scene = random_moving_scene(np.random.default_rng(1))
+    ends = np.array([Transmission.of(scene).q_rad(at) for at in ((100, 200), (900, -700))])
+    share = 5 / 9
+    tip = forward(Arm.from_spec(scene.arm), ends[0] + share * (ends[1] - ends[0]))[-1]
+    away = ObstacleMotion((0.0, 5.0), ((0.0, 0.0), (-20.0, 0.0)), False)
+    scene = replace(scene, obstacles=(Obstacle("circle", (float(tip[0]) + 20.0, float(tip[1])), 0.2, motion=away),))
+    plan = a_plan(scene)
+    plan.segments.segments = motion(9)
+    plan.trajectory = SimpleNamespace(sample=lambda t_s: (ends[0] + np.outer(t_s / 0.018, ends[1] - ends[0]),))
+    clock = FakeClock()
+
+    def streamer(_plan, keeper):
+        clock.at_s = keeper.start_at_s
+        raise StreamError("no reply", replace(position(Certainty.BOUNDED), executed_segments=(3, 9)))
+
+    with pytest.raises(StreamError) as caught:
+        stream_on_time(plan, clock, streamer, None)
+    (note,) = caught.value.__notes__
+    assert note.startswith("wherever it rests between what was executed and what was sent: obstacles[1] touches")
+    assert 4.0 < float(note.split("after ")[1].split()[0]) <= 5.0
 
 
 @pytest.mark.parametrize("certainty", [Certainty.BOUNDED, Certainty.LOST])
 def test_without_an_exact_position_nothing_is_planned_again(certainty):
     clock = FakeClock()
     streamer, starts = late_once(clock, StreamError("gone", position(certainty)))
+    plan = a_plan(replace(random_moving_scene(np.random.default_rng(1)), obstacles=()))
+    plan.segments.segments = motion(9)
+    plan.trajectory = SimpleNamespace(sample=lambda t_s: (np.zeros((len(t_s), 2)),))
     with pytest.raises(StreamError, match="gone"):
-        stream_on_time(a_plan(random_moving_scene(np.random.default_rng(1))), clock, streamer, None)
+        stream_on_time(plan, clock, streamer, None)
     assert len(starts) == 1
 
 
@@ -224,7 +267,7 @@ def test_a_pose_that_nothing_comes_near_has_no_problem():
     scene = replace(random_moving_scene(np.random.default_rng(1)), obstacles=())
     q = inverse_2r(Arm.from_spec(scene.arm), (25.0, 3.0), "up")
     resting = replace(scene, task=replace(scene.task, start_rad=tuple(map(float, q))))
-    assert rest_problem(resting, 5.0) == ""
+    assert rest_touch(resting, 5.0) is None
 
 
 def test_a_plan_is_animated_with_its_obstacles_in_real_time(tmp_path):

@@ -254,21 +254,45 @@ def test_contacts_of_a_rule_are_contacts_and_runs_without_are_clear():
 
         def pose_at(time_s, q=q):
             k = min(int(time_s / SAMPLE_S), len(q) - 2)
-            u = time_s / SAMPLE_S - k
+            u = min(1.0, time_s / SAMPLE_S - k)  # at the end it rests
             return q[k] + (q[k + 1] - q[k]) * (3 * u**2 - 2 * u**3)
 
         if run.contact is None:
             found["clear"] += 1
-            for time_s in np.linspace(0.0, run.path.arrival * SAMPLE_S, 60):
+            until = moving.clock.samples if run.outcome == "reached" else run.path.arrival
+            for time_s in np.linspace(0.0, until * SAMPLE_S, 90):
                 assert clearance_at(scene, pose_at(time_s), time_s) > scene.margin_cm - 1e-3, f"seed {seed}"
         else:
             found["contact"] += 1
             found["between"] += run.contact.between
             assert run.outcome == "contact"
+            assert not run.contact.at_goal
             at = run.contact.time_s
             assert clearance_at(scene, pose_at(at), at) <= scene.margin_cm + 1e-9, f"seed {seed}"
             assert f"obstacles[{run.contact.obstacle}]" in run.contact.words()
     assert min(found["contact"], found["clear"]) > 0
+
+
+def test_a_goal_that_is_taken_after_a_rule_has_reached_it_is_the_rules_failure():
+    # The arm is there after 2 samples. From sample 6 to 16 a disc comes 10 cm along link 2's line, to its end.
+    comes = ObstacleMotion((0.0, 6 * SAMPLE_S, 16 * SAMPLE_S), ((0.0, 0.0), (0.0, 0.0), (-10.0, 0.0)), False)
+    scene = make_scene(
+        [Obstacle("circle", (38.0, 4.0), 2.0, motion=comes)],
+        links=(15.0, 15.0), limits=QUARTER, x=(-32.0, 32.0), y=(-32.0, 32.0), cell=2.0,
+        start=(28.0, 0.0), goal=(28.0, 4.0),
+    )  # fmt: skip
+    moving = build_moving_map(replace_moving(scene, MovingSpec(SAMPLE_S, 20, 0.0)), "up")
+    for rule in ("plain", "modified"):
+        run = run_rule(rule, moving, *task_of(scene, moving))
+        assert run.outcome == "goal taken"
+        assert run.path.arrival == 2
+        # 9 cm between tip and disc, less the margin, at 10 cm in 10 samples.
+        touched_s = (6 + 9.0 - scene.margin_cm) * SAMPLE_S
+        assert touched_s - 1e-6 <= run.contact.time_s <= touched_s + SAMPLE_S
+        assert clearance_at(scene, run.path.q_rad[-1], run.contact.time_s) <= scene.margin_cm + 1e-9
+        assert run.words().startswith("obstacles[1] touches the arm at the goal by sample 15")
+    before = build_moving_map(replace_moving(scene, MovingSpec(SAMPLE_S, 14, 0.0)), "up")
+    assert run_rule("modified", before, *task_of(scene, before)).words() == "reached at sample 2"
 
 
 def test_an_arm_and_an_obstacle_that_change_places_between_two_samples_are_found():

@@ -15,9 +15,9 @@ def ready():
     kernels = {id(k): k for m in modules for k in vars(m).values() if isinstance(k, CPUDispatcher)}
     return {(k.__name__, str(signature)) for k in kernels.values() for signature in k.overloads}
 
-warm_up(on_roadmap=True)
+warm_up(on_roadmap=True, moving=True)
 before = ready()
-for name in ("table1_case1", "table1_case2", "energy_two_links"):
+for name in ("table1_case1", "table1_case2", "energy_two_links", "moving_env1"):
     plan_scene(load_scene(f"examples/{name}.toml"), lambda stage, share: None)
 assert len(before) > 10, before
 print(sorted(ready() - before))

@@ -2,12 +2,11 @@
 
 from contextlib import closing
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-from moving_scenes import clearance_at
+from moving_scenes import clearance_at, environment, quiet
 from planarm.errors import NoPathError, SceneError
 from planarm.link.arm_record import ArmSetup
 from planarm.link.transport import open_transport
@@ -15,30 +14,13 @@ from planarm.model.arm import Arm
 from planarm.model.kinematics import forward
 from planarm.pipeline import judge_emulated_arm, judge_pins, plan_scene, run_scene
 from planarm.record.arm_findings import judge_arm
-from planarm.scene import ObstacleMotion, load_scene
+from planarm.run_folder.summary import planned_figures
+from planarm.scene import ObstacleMotion
 from planarm.stepping.certify import certify
 from planarm.streaming.plan_stream import stream
 
-EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
-
-
 QUEUED_S = 1.0
 """The device's queue holds less than this of such a slow motion, and hides a pause of the host for as long."""
-
-
-def quiet(_stage, _share):
-    return None
-
-
-def environment(number, *, faster=1.0, smoothing="none"):
-    """An example, its clock run faster: obstacles and samples alike."""
-    scene = load_scene(EXAMPLES / f"moving_env{number}.toml")
-    moving = replace(scene.moving, sample_s=scene.moving.sample_s / faster, smoothing=smoothing)
-    obstacles = tuple(
-        replace(o, motion=replace(o.motion, times_s=tuple(t / faster for t in o.motion.times_s)))
-        for o in scene.obstacles
-    )
-    return replace(scene, moving=moving, obstacles=obstacles)
 
 
 def on_the_bench(plan):
@@ -71,6 +53,10 @@ def assert_as_planned_and_clear(plan, findings, arm):
 def test_steps_are_the_plans_and_no_link_touches_an_obstacle_at_its_time(plan, run):
     assert plan.certificate.ok, plan.certificate.explain()
     assert plan.moving.delay_margin_s >= plan.scene.moving.delay_margin_s
+    plain, modified = planned_figures(plan)["rules"]
+    assert plain["outcome"] == "contact"
+    assert plain["what"].startswith("obstacles[1] touches a link at sample 18")
+    assert (modified["outcome"], modified["what"]) == ("reached", "reached at sample 65")
     assert_as_planned_and_clear(plan, *run)
 
 

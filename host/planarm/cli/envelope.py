@@ -57,7 +57,7 @@ def execute(options: argparse.Namespace) -> int:
 
         with progress(options.json) as notice:
             notice("kernels", 0.0)
-            warm_up(on_roadmap=scene.planner.on_roadmap)
+            warm_up(on_roadmap=scene.planner.on_roadmap, moving=scene.moving is not None)
             notice("kernels", 1.0)
 
             def certify_at(stage: str) -> Certify:

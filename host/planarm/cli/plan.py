@@ -44,7 +44,7 @@ def execute(options: argparse.Namespace) -> int:
     require_place(target)
     with progress(options.json) as notice:
         notice("kernels", 0.0)
-        warm_up(on_roadmap=scene.planner.on_roadmap)
+        warm_up(on_roadmap=scene.planner.on_roadmap, moving=scene.moving is not None)
         notice("kernels", 1.0)
         plan = plan_scene(scene, notice)
     save_plan(stored(plan), target)
@@ -61,6 +61,8 @@ def execute(options: argparse.Namespace) -> int:
         "plan_ms": plan.plan_ms,
         "certificate": rows,
     }
+    if plan.moving is not None:
+        told["rules"] = [run.figures() for run in plan.moving.rules]
     if options.alternatives:
         told["routes"] = routes
     if options.json:
@@ -68,6 +70,8 @@ def execute(options: argparse.Namespace) -> int:
     else:
         print(f"{target}: {plan.path.length_cm:.4f} cm in {plan.trajectory.duration_s:.3f} s")
         print(plan.timing.words())
+        for run in told.get("rules", ()):
+            print(f"by the rule, {run['rule']} D*: {run['what']}")
     return 0
 
 

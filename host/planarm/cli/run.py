@@ -24,7 +24,7 @@ def execute(options: argparse.Namespace) -> int:
     out = Path(options.out or Path("out") / f"{Path(scene.source).stem}-{scene.planner.algorithm}")
     with progress(options.json or options.live == "terminal") as notice:
         notice("kernels", 0.0)
-        warm_up(on_roadmap=scene.planner.on_roadmap)
+        warm_up(on_roadmap=scene.planner.on_roadmap, moving=scene.moving is not None)
         notice("kernels", 1.0)
         port = scene.link.port if options.port is None else options.port
         faults = Path(options.faults) if options.faults else None

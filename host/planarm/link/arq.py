@@ -83,6 +83,7 @@ class GoBackN:
         self._smoothed_s: float | None = None
         self._least_s = 0.0
         self._deviation_s = 0.0
+        self.round_trip_s = 0.0  # the newest that was measured
         self._timeout_s = INITIAL_TIMEOUT_S
         self._patience = 1.0  # grows with every time-out in a row
         self._timer_s = 0.0
@@ -177,6 +178,7 @@ class GoBackN:
     def _measure(self, round_trip_s: float) -> None:
         """RFC 6298, section 2; only such a measurement ends the growth of the time-out (section 5)."""
         self._patience = 1.0
+        self.round_trip_s = round_trip_s
         if self._smoothed_s is None:
             self._smoothed_s, self._deviation_s, self._least_s = round_trip_s, round_trip_s / 2, round_trip_s
         else:

@@ -160,6 +160,18 @@ class StreamError(LinkError):
         self.position = position
 
 
+class MissedStartError(LinkError):
+    """The segments of a motion with an agreed start were in the device too late; nothing has moved."""
+
+    def __init__(self, start_at_s: float, now_s: float, lead_s: float) -> None:
+        super().__init__(
+            f"the motion was due to start at {start_at_s:.6f} s, but its segments are in the device only at"
+            f" {now_s:.6f} s, later than {lead_s:g} s before; nothing has moved"
+        )
+        self.by_s = now_s + lead_s - start_at_s
+        """By how much it was missed."""
+
+
 class StreamFault(DeviceFault):
     """The device latched a fault or refused a frame during a motion; `position` tells what is known of the arm."""
 

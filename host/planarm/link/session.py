@@ -119,6 +119,11 @@ class Session:
         return self._arq.counters
 
     @property
+    def round_trip_s(self) -> float:
+        """From a frame to its acknowledgement, as last measured; 0 before."""
+        return self._arq.round_trip_s
+
+    @property
     def room_in_flight(self) -> int:
         """Bytes of the device's queue that frames sent and not acknowledged take."""
         return self._arq.room_in_flight

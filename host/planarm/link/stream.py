@@ -18,7 +18,7 @@ from planarm.link.margin import line_margin
 from planarm.link.packing import Packer
 from planarm.link.path_time import PathTime
 from planarm.link.plan_steps import PlanSteps
-from planarm.link.position import executed_since, moved_usteps
+from planarm.link.position import MissedStartError, executed_since, moved_usteps
 from planarm.link.session import Session
 from planarm.link.stream_values import AT_EASE, Joining, Phase, StreamOptions, StreamProgress, config_of
 from planarm_wire.codec import encoded_bytes
@@ -105,6 +105,11 @@ class Stream:
     def sent_segments(self) -> int:
         """Segments sent so far, those of an earlier session included."""
         return self._packer.sent
+
+    @property
+    def round_trip_s(self) -> float:
+        """From a frame to its acknowledgement, as last measured; 0 before."""
+        return self._session.round_trip_s
 
     @property
     def done(self) -> bool:
@@ -248,10 +253,8 @@ class Stream:
         start_at_s, least = self._options.start_at_s, self._options.lead_ticks
         left = least if start_at_s is None else round((start_at_s - now_s) * TICKS_HZ)
         if left < least:
-            raise LinkError(
-                f"the motion was due to start at {start_at_s:.6f} s, but its segments are in the device only at"
-                f" {now_s:.6f} s, later than {least / TICKS_HZ:g} s before; nothing has moved"
-            )
+            assert start_at_s is not None, "the least lead is never missed"
+            raise MissedStartError(start_at_s, now_s, least / TICKS_HZ)
         return left
 
     def _begin_running(self, now_s: float) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from time import perf_counter
+from typing import Final
 
 import numpy as np
 
@@ -12,6 +13,7 @@ from planarm.model.arm import Arm
 from planarm.model.kinematics import forward
 from planarm.model.moving import moving_set
 from planarm.scene import Point, Scene
+from planarm.search.moving.rules import Rule, RuleRun, run_rule
 from planarm.search.moving.space_time import MovingStatus, SpaceTimeResult, search_space_time, world_of
 from planarm.search.moving.timed_path import TimedPath
 from planarm.smoothing.joint_spline import JointSpline
@@ -26,6 +28,9 @@ from planarm.workspace.world import build_world, elbow_sides
 
 LOOK_S = 0.05
 """To this the time is told at which a resting arm is touched."""
+
+RULES: Final[tuple[Rule, ...]] = ("plain", "modified")
+"""What a plan tells beside the exact search."""
 
 NEAR_CELLS = 1.6
 """A pose that is no node is joined to nodes this near."""
@@ -49,6 +54,8 @@ class MovingRoute:
     map_s: float
     search_s: float
     proofs: int
+    rules: tuple[RuleRun, ...] = ()
+    """What plain D* and paper B's rule would have done, simulated to the end; none from a pose that is no node."""
 
 
 def find_moving_route(scene: Scene, margin_cm: float) -> MovingRoute:
@@ -109,7 +116,14 @@ def _smoothed(
         map_s,
         result.search_s,
         result.proofs,
+        () if scene.task.start_rad else by_rules(scene, moving_map),
     )
+
+
+def by_rules(scene: Scene, moving_map: MovingMap) -> tuple[RuleRun, ...]:
+    """Simulate plain D* and paper B's modified D* to their ends; a contact is a failure of the rule."""
+    start, goal = (moving_map.cell_at(point) for point in (scene.task.start_cm, scene.task.goal_cm))
+    return tuple(run_rule(rule, moving_map, start, goal) for rule in RULES)
 
 
 def _from_node(scene: Scene, moving_map: MovingMap, goal: int) -> SpaceTimeResult:
@@ -185,8 +199,22 @@ def _no_motion(scene: Scene, moving_map: MovingMap, result: SpaceTimeResult) -> 
     return error
 
 
-def rest_problem(scene: Scene, for_s: float) -> str:
-    """Say which obstacle touches the arm in its task's start pose, and when; empty when none does.
+@dataclass(frozen=True, slots=True)
+class RestTouch:
+    """What touches an arm that rests."""
+
+    obstacle: int
+    """Counted from 1."""
+    after_s: float
+    """To LOOK_S, rounded down."""
+
+    def words(self) -> str:
+        """Say it."""
+        return f"obstacles[{self.obstacle}] touches the resting arm after {self.after_s:.2f} s"
+
+
+def rest_touch(scene: Scene, for_s: float) -> RestTouch | None:
+    """Return what first touches the arm in its task's start pose; None when nothing does.
 
     Args:
         scene: with joint angles at its task's start; time 0 is now.
@@ -201,5 +229,5 @@ def rest_problem(scene: Scene, for_s: float) -> str:
         piece[0] = scene.task.start_rad
         verdict, _, obstacle = prove_moving_piece(world, piece, begin_s, min(LOOK_S, until_s - begin_s), 0.0)
         if verdict != PROVED:
-            return f"obstacles[{obstacle + 1}] touches the resting arm after {begin_s:.2f} s"
-    return ""
+            return RestTouch(int(obstacle) + 1, float(begin_s))
+    return None

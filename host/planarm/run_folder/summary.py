@@ -99,6 +99,7 @@ def _moving_figures(plan: Plan) -> dict[str, Any]:
         "node_path_length_cm": round(route.path.length_cm, 6),
         "moves_proved_one_by_one": route.proofs,
         "map_ms": round(1e3 * route.map_s, 3),
+        "rules": [run.figures() for run in route.rules],
     }
 
 

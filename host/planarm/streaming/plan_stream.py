@@ -13,6 +13,7 @@ from planarm.errors import CertificateError
 from planarm.link.exchange import StreamResult, stream_plan
 from planarm.link.journal import JournalWriter
 from planarm.link.recording import RecordingTransport
+from planarm.link.session import SessionLimits
 from planarm.link.stream import Joining, Stream, StreamOptions, StreamProgress
 from planarm.link.transport import Transport
 from planarm.model.transmission import Transmission, motor_axes
@@ -73,6 +74,7 @@ def stream(
     joining: Joining | None = None,
     steer: Callable[[Stream], None] | None = None,
     warn: Callable[[str], None] | None = None,
+    limits: SessionLimits | None = None,
 ) -> StreamResult:
     """Stream a certified plan and wait until it is executed; `steer` may hold, resume and stop it meanwhile.
 
@@ -85,4 +87,4 @@ def stream(
     if not certificate.ok:
         raise CertificateError(certificate.explain())
     options = options or StreamOptions(allowances=plan.allowances)
-    return stream_plan(transport, plan.segments, on_progress, options, joining=joining, steer=steer, warn=warn)
+    return stream_plan(transport, plan.segments, on_progress, options, limits, joining, steer, warn)

@@ -1,7 +1,8 @@
 """Runs by a rule, simulated to their end before anything moves: plain D* and paper B's modified D*.
 
-A rule looks at the nodes at each motion sample. What lies between two samples is judged afterwards, and a run that
-touches something there has failed as well, however it ended by its own light.
+A rule looks at the nodes at each motion sample, and ends at the goal. What lies between two samples, and the rest at
+the goal to the horizon, are judged afterwards: a run in which something touches there has failed as well, however it
+ended by its own light.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ from planarm.workspace.moving_proof import MovingWorld, fill_move, prove_moving_
 from planarm.workspace.proof import BLOCKED
 
 Rule = Literal["plain", "modified"]
-Outcome = Literal["reached", "contact", "no path", "horizon"]
+Outcome = Literal["reached", "contact", "goal taken", "no path", "horizon"]
 OUTCOMES: dict[int, Outcome] = {REACHED: "reached", CONTACT: "contact", NO_PATH: "no path", HORIZON: "horizon"}
 
 
@@ -36,9 +37,15 @@ class Contact:
     """Counted from 1."""
     between: bool
     """True when it is only between two samples, where a rule does not look."""
+    at_goal: bool = False
+    """True when the arm rests at the goal, where the rule has ended."""
 
     def words(self) -> str:
         """Say what touches, and when."""
+        if self.at_goal:
+            return (
+                f"obstacles[{self.obstacle}] touches the arm at the goal by sample {self.sample} ({self.time_s:.3f} s)"
+            )
         where = f"between samples {self.sample - 1} and {self.sample}" if self.between else f"at sample {self.sample}"
         return f"obstacles[{self.obstacle}] touches a link {where} ({self.time_s:.3f} s)"
 
@@ -49,12 +56,24 @@ class RuleRun:
 
     rule: Rule
     outcome: Outcome
-    """As the rule sees it, at samples; then what lies between is looked at: any contact makes it one."""
+    """As the rule sees it, at samples; then what lies between is looked at: any contact makes it one, and one while the
+    arm rests at the goal, up to the horizon, makes it "goal taken"."""
     path: TimedPath | None
     """Where the arm was, up to the end or the contact; None without a path."""
     contact: Contact | None
     run_s: float
     """Wall time of search and simulation, without the map."""
+
+    def words(self) -> str:
+        """Say how it ended."""
+        if self.contact is not None:
+            return self.contact.words()
+        arrival = f" at sample {self.path.arrival}" if self.outcome == "reached" and self.path is not None else ""
+        return f"{self.outcome}{arrival}"
+
+    def figures(self) -> dict[str, str]:
+        """Return it as one mapping, for summaries."""
+        return {"rule": self.rule, "outcome": self.outcome, "what": self.words()}
 
 
 def run_rule(rule: Rule, moving_map: MovingMap, start: int, goal: int) -> RuleRun:
@@ -81,8 +100,10 @@ def run_rule(rule: Rule, moving_map: MovingMap, start: int, goal: int) -> RuleRu
         return RuleRun(rule, outcome, None, None, run_s)
     timed = TimedPath.through(moving_map, poses.cell[places[: end + 1]].astype(np.int64))
     contact = first_contact(moving_map, timed)
+    if contact is None and outcome == "reached":
+        contact = _contact_at_goal(moving_map, timed)
     if contact is not None:
-        outcome = "contact"
+        outcome = "goal taken" if contact.at_goal else "contact"
     return RuleRun(rule, outcome, timed, contact, run_s)
 
 
@@ -99,6 +120,18 @@ def first_contact(moving_map: MovingMap, path: TimedPath) -> Contact | None:
             return Contact(k + 1, end_s, by + 1, between=False)
         if verdict == BLOCKED:
             return Contact(k + 1, float(time_s), int(obstacle) + 1, between=True)
+    return None
+
+
+def _contact_at_goal(moving_map: MovingMap, path: TimedPath) -> Contact | None:
+    """Return the first contact of the arm that rests at a path's end, up to the horizon; None when it stays free."""
+    world, clock = world_of(moving_map), moving_map.clock
+    piece = np.zeros((4, 2))
+    piece[0] = path.q_rad[-1]
+    for k in range(path.arrival, clock.samples):
+        verdict, time_s, obstacle = prove_moving_piece(world, piece, k * clock.sample_s, clock.sample_s, 0.0)
+        if verdict == BLOCKED:
+            return Contact(k + 1, float(time_s), int(obstacle) + 1, between=False, at_goal=True)
     return None
 
 
