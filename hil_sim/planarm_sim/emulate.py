@@ -13,6 +13,7 @@ from types import FrameType
 from planarm_sim.bench import Bench, BenchReport
 from planarm_sim.board import CLOCK_HZ, Uno, Usb
 from planarm_sim.bridge import BOOT_S, Bridge, BridgeCounts, Clock, Line, Speed, WallClock
+from planarm_sim.bridge.punctual import punctual
 from planarm_sim.cpu.chip import StopCause
 from planarm_sim.debug import GdbServer
 from planarm_sim.errors import BridgeError, StoppedError
@@ -113,7 +114,7 @@ def emulate(
     if around is not None:
         around(Uno(_load(image_path), bootloader=_load(bootloader))).run(cycles=COMPILING_CYCLES)
         bench = around(uno)
-    with _stopped_by_signals() as stop, PtyLine(link, uno.serial.baud) as line:
+    with _stopped_by_signals() as stop, PtyLine(link, uno.serial.baud) as line, punctual():
         announce(line.path)
         return run_board(
             uno,

@@ -67,9 +67,10 @@ class Sink:
 
     def take(self) -> None:
         """Carry away what was recorded since the last call."""
-        log = self._uno.serial.take_log()
         if self._serial is not None:
-            self._serial.write(log)
+            self._serial.write(self._uno.serial.take_log())
+        else:
+            self._uno.serial.clear_log()
         edges = self._uno.take_edges()
         if len(edges) == 0:
             return

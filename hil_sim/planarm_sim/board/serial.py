@@ -101,6 +101,13 @@ class SerialPort:
         return self._line_free_cycle()
 
     @property
+    def next_delivery_cycle(self) -> int:
+        """First cycle at which there may be bytes to read that are not there now, whatever the program does."""
+        cycle = self._chip.cycle
+        byte_cycles = FRAME_BITS * self._bit_cycles[0] // self._bit_cycles[1]
+        return cycle + 1 if self.bridge is None else self.bridge.next_delivery_cycle(cycle, byte_cycles)
+
+    @property
     def room(self) -> int:
         """Bytes that the host can hand over now; the USB bridge takes no more than its ring and one packet hold."""
         taken_ahead = RING_BYTES if self.bridge is None else RING_BYTES + PACKET_BYTES

@@ -111,6 +111,14 @@ class UsbBridge:
             data += self._packets.popleft()[1]
         return bytes(data)
 
+    def next_delivery_cycle(self, cycle: int, byte_cycles: int) -> int:
+        """First cycle from `cycle` on at which the host may have bytes, if the board sends one each `byte_cycles`."""
+        self.advance(cycle)
+        if self._packets:
+            return self._packets[0][0]
+        nearly_full = cycle + max(0, NEARLY_FULL + 1 - self._count) * byte_cycles
+        return max(cycle, self._free_at, min(self._next_tick, nearly_full)) + PACKET_CYCLES
+
     def snapshot(self) -> UsbState:
         """Copy the state."""
         return UsbState(

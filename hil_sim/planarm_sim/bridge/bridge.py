@@ -240,8 +240,16 @@ class Bridge:
 
     def _sleep(self) -> None:
         if self._real:
-            quiet = self._is_quiet()
             ahead_s = (self._uno.cycle - self._anchor_cycle) / CLOCK_HZ - (self._clock.now_s() - self._anchor_s)
-            timeout_s = ahead_s + (QUIET_SLICE_S if quiet else LIVELY_SLICE_S)
-            room = self._uno.serial.room > 0
-            self._line.wait(timeout_s, for_bytes=room)
+            self._line.wait(ahead_s + self._slice_s(), for_bytes=self._uno.serial.room > 0)
+
+    def _slice_s(self) -> float:
+        """How much emulated time may pass before the line wants to be served, unless the host sends something."""
+        serial, cycle = self._uno.serial, self._uno.cycle
+        if serial.bridge is None:
+            most_s = QUIET_SLICE_S if self._is_quiet() else LIVELY_SLICE_S
+        else:  # the USB bridge hands bytes over at moments that are known before
+            most_s = min(QUIET_SLICE_S, (serial.next_delivery_cycle - cycle) / CLOCK_HZ)
+        if serial.room == 0:  # the host waits with more bytes, and those under way must not run out before
+            most_s = min(most_s, (serial.idle_cycle - cycle) / CLOCK_HZ / 2)
+        return max(most_s, LIVELY_SLICE_S if serial.bridge is None else 0.0)
