@@ -31,6 +31,9 @@ Speed = Literal["real", "max"]
 LIVELY_SLICE_S = 0.000_25
 """Real speed: longest sleep while bytes are under way; 6 bytes at 250,000 baud."""
 
+LEAST_SLICE_S = 0.000_02
+"""Real speed: shortest sleep, about what a look at the line costs."""
+
 QUIET_SLICE_S = 0.002
 """Longest sleep otherwise: how late an opened port, a stop or the board's first byte may be noticed."""
 
@@ -252,4 +255,4 @@ class Bridge:
             most_s = min(QUIET_SLICE_S, (serial.next_delivery_cycle - cycle) / CLOCK_HZ)
         if serial.room == 0:  # the host waits with more bytes, and those under way must not run out before
             most_s = min(most_s, (serial.idle_cycle - cycle) / CLOCK_HZ / 2)
-        return max(most_s, LIVELY_SLICE_S if serial.bridge is None else 0.0)
+        return max(most_s, LIVELY_SLICE_S if serial.bridge is None else LEAST_SLICE_S)
