@@ -42,13 +42,13 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
+from planarm_wire.kernel_cache_loading import load_at_once
+
 F = TypeVar("F", bound=Callable[..., Any])
 
 CACHE_DIR_VARIABLE = "PLANARM_CACHE_DIR"
 KEPT_BUILDS = 16
 _BLAS = "scipy.linalg.cython_blas"
-_DOORS = (b"NRT_", b"numba_xx", b"numba_ez")
-"""How the names of Numba's ways to its run-time library, BLAS and LAPACK begin."""
 
 _DECORATED = re.compile(rb"^@kernel$", re.M)
 _KEY_NAME = re.compile(r"[0-9a-f]{16}")
@@ -102,46 +102,13 @@ def bare_kernel(function: F) -> F:
     compiled: Any = _with_cache(function)
     if compiled is not function:  # plain Python when the compiler is switched off
         compiled.targetoptions["_nrt"] = False
-        _load_at_once(compiled._cache)
+        load_at_once(compiled._cache, _import_array_functions)
     return cast("F", compiled)
 
 
 def is_switched_off() -> bool:
     """Tell whether NUMBA_DISABLE_JIT is set: kernels are then plain Python."""
     return os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0")
-
-
-def _load_at_once(cache: Any) -> None:  # noqa: ANN401 - Numba has no types
-    """Have a function's cache load compiled code without Numba's registries first.
-
-    These say how to compile every function that Numba knows. Machine code needs none of them, unless it calls the
-    run-time library, BLAS or LAPACK, whose doors Numba opens as it fills them; and they take half of a cached start.
-    Whatever does compile fills them itself. Should a later Numba load in another way, it may.
-    """
-    parts = ("_guard_against_spurious_io_errors", "_cache_file", "_index_key", "_impl")
-    if not all(hasattr(cache, part) for part in parts):
-        return
-
-    def load_overload(signature: object, target_context: Any) -> object:  # noqa: ANN401
-        loaded = None  # to be compiled; also when the guard lets an error of the disk pass
-        with cache._guard_against_spurious_io_errors():
-            saved = cache._cache_file.load(cache._index_key(signature, target_context.codegen()))
-            if saved is not None:
-                if not _is_plain(saved):
-                    _import_array_functions()
-                    target_context.refresh()
-                loaded = cache._impl.rebuild(target_context, saved)
-        return loaded
-
-    cache.load_overload = load_overload
-
-
-def _is_plain(saved: Any) -> bool:  # noqa: ANN401
-    """Tell whether what Numba saved is machine code through none of the doors; False as well for what looks unknown."""
-    match saved:
-        case ((_, "object", (bytes(machine_code), _)), *_):
-            return not any(name in machine_code for name in _DOORS)
-    return False
 
 
 @functools.cache
@@ -230,12 +197,19 @@ def _key(module: str, source: Path) -> str:
     """Hash what can end up in the compiled code of `module`, whose file is `source`."""
     digest = hashlib.sha256()
     settings = sorted(item for item in os.environ.items() if item[0].startswith("NUMBA_"))
-    digest.update(repr((sys.version, metadata.version("numba"), settings)).encode())
+    digest.update(repr((sys.version, _numba_version(), settings)).encode())
     for name, path in sorted(_closure(module, source).items()):
         text = _text(path)
         digest.update(f"\n{name}\n{len(text)}\n".encode())
         digest.update(text)
     return digest.hexdigest()[:16]
+
+
+@functools.cache
+def _numba_version() -> str:
+    """Return Numba's version; from itself when it is there, as to ask the install for it takes a dozen milliseconds."""
+    loaded = sys.modules.get("numba")
+    return str(loaded.__version__) if loaded is not None else metadata.version("numba")
 
 
 @functools.cache

@@ -6,20 +6,23 @@ import pytest
 
 from planarm_sim import Uno
 from planarm_sim.board import CLOCK_HZ
-from planarm_sim.board.usb_bridge import RING_BYTES
+from planarm_sim.board.usb_bridge import FLUSH_CYCLES, PACKET_CYCLES, RING_BYTES
 from planarm_sim.bridge import Bridge
-from planarm_sim.bridge.bridge import GIVE_UP_LAG_S, LIVELY_SLICE_S, MAX_CHUNK_S, QUIET_SLICE_S
+from planarm_sim.bridge.bridge import GIVE_UP_LAG_S, LEAST_SLICE_S, LIVELY_SLICE_S, MAX_CHUNK_S, QUIET_SLICE_S
 from sim_board.fake_line import FakeClock, FakeLine
 
 DATA = Path(__file__).parent / "data"
 BOOT_S = 0.001
+TICK_S = FLUSH_CYCLES / CLOCK_HZ
 BYTE_S = 40e-6  # ten bits at 250,000 baud
 POWER_UP, RESET = b"R\x01", b"R\x02"  # what echo.S sends first: 'R' and MCUSR
 
 
 class Rig:
-    def __init__(self, acts, *, image="echo.hex", speed="real", boot_s=0.0, cost_s=0.0, room=10**6) -> None:
-        self.uno = Uno.from_hex(DATA / image)
+    def __init__(
+        self, acts, *, image="echo.hex", speed="real", boot_s=0.0, cost_s=0.0, room=10**6, usb="direct"
+    ) -> None:
+        self.uno = Uno.from_hex(DATA / image, usb=usb)
         self.uno.run(seconds=BOOT_S)  # the program has greeted, and cleared MCUSR
         self.clock = FakeClock()
         self.line = FakeLine(self.clock, acts, room)
@@ -219,3 +222,39 @@ def test_a_run_ends_on_its_cycle(speed):
     rig = Rig([(0.0, "open")], speed=speed, image="pulses.hex")
     rig.bridge.run(seconds=0.0123)
     assert 0 <= rig.uno.cycle - (BOOT_S + 0.0123) * CLOCK_HZ < 16
+
+
+# --- awake no more often than the USB bridge asks for ---
+
+
+def test_behind_the_usb_bridge_bytes_come_at_its_ticks_and_nobody_looks_in_between():
+    """A lone byte is on the wire for 40 us each way, then lies in the ring until the tick: multiples of 4.096 ms."""
+    moments = [0.1 + 0.0131 * n for n in range(20)]
+    rig = Rig([(0.0, "open"), *((when, b"a") for when in moments)], usb="16u2", boot_s=None)
+    rig.bridge.run(seconds=0.1)
+    steps = rig.steps
+    rig.bridge.run(seconds=0.4)
+    came = [when for when, data in rig.line.received if data == b"b"]
+    ticks = [when + BOOT_S - PACKET_CYCLES / CLOCK_HZ for when in came]  # since power-up, as the bridge's timer counts
+    off = [tick - round(tick / TICK_S) * TICK_S for tick in ticks]
+    assert len(came) == 20
+    assert max(map(abs, off)) <= LEAST_SLICE_S + 1e-6
+    assert all(
+        2 * BYTE_S <= answer - when <= 2 * BYTE_S + TICK_S + 1e-4 for when, answer in zip(moments, came, strict=True)
+    )
+    assert rig.steps - steps <= 0.4 / QUIET_SLICE_S + 0.4 / TICK_S + 2 * 20 + 10
+
+
+def test_a_full_ring_is_filled_again_before_it_runs_dry():
+    rig = Rig([(0.0, "open"), (0.01, bytes([9] * 2000))], usb="16u2", boot_s=None)
+    rig.bridge.run(seconds=0.011)
+    emptiest = 10**6
+
+    def watch() -> None:
+        nonlocal emptiest
+        if rig.line.inbox:
+            emptiest = min(emptiest, rig.uno.serial.pending)
+
+    rig.bridge._after_run = watch
+    rig.bridge.run(seconds=0.05)
+    assert emptiest > 0, "the line is busy for as long as the host has something to say"

@@ -190,3 +190,39 @@ def test_a_hosts_rates_are_seen_on_a_terminal(tmp_path):
         for rate in (9_600, 115_200, 250_000, 500_000, 2_000_000):
             with serial.Serial(str(tmp_path / "uno"), rate):
                 assert line.baud() == rate
+
+
+# --- when the host has something to fetch ---
+
+
+@settings(deadline=None)
+@given(st.lists(st.integers(BYTE, 40_000), min_size=1, max_size=300))
+def test_a_host_that_looks_only_when_told_misses_nothing(spacings):
+    bridge = UsbBridge()
+    cycle, got, told = 0, bytearray(), bridge.next_delivery_cycle(0, BYTE)
+
+    def look_until(end):
+        nonlocal told
+        while told <= end:
+            assert bridge.fetch(told - 1) == b"", "nothing comes before"
+            got.extend(bridge.fetch(told))
+            before, told = told, bridge.next_delivery_cycle(told, BYTE)
+            assert told > before
+
+    for n, spacing in enumerate(spacings):
+        cycle += spacing
+        look_until(cycle)
+        bridge.receive(cycle, n & 0xFF)
+    look_until(cycle + 2 * FLUSH_CYCLES)
+    assert got == bytes(n & 0xFF for n in range(len(spacings)))
+
+
+def test_the_next_delivery_is_a_ticks_or_a_nearly_full_rings():
+    bridge = UsbBridge()
+    assert bridge.next_delivery_cycle(0, BYTE) == 97 * BYTE + PACKET_CYCLES, "97 bytes come before the first tick"
+    assert bridge.next_delivery_cycle(0, 2 * BYTE) == FLUSH_CYCLES + PACKET_CYCLES
+    at = feed(bridge, 10)
+    due = bridge.next_delivery_cycle(at, 2 * BYTE)
+    assert (bridge.fetch(due - 1), bridge.fetch(due)) == (b"", bytes(range(10)))
+    nearly = feed(bridge, 90, start=due)
+    assert bridge.next_delivery_cycle(nearly, BYTE) == nearly + 7 * BYTE + PACKET_CYCLES, "seven more may come first"

@@ -5,6 +5,7 @@ import stat
 import subprocess
 import sys
 import time
+from importlib import metadata
 from pathlib import Path
 
 import pytest
@@ -144,6 +145,37 @@ print(before, product(np.array([1.0, 2.0]), np.array([3.0, 4.0])), "numba.np.arr
     (package / "bare.py").write_text(f"from planarm_wire.kernel_cache import bare_kernel as kernel\n\n\n{kernels}")
     run(package, tmp_path / "cache", program=look)  # to compile, Numba fills its registries
     assert run(package, tmp_path / "cache", program=look) == ["False", "11.0", "True"]
+
+
+def test_a_kernel_compiled_later_links_a_cached_one(package: Path, tmp_path: Path) -> None:
+    """What lies beside the machine code for linking is read then, and not before."""
+    look = """
+import llvmlite.binding as llvm
+from planarm_wire import kernel_cache
+from arm_kernels.callee import twice
+read, parse, empty = [], llvm.parse_bitcode, len(llvm.parse_assembly("").as_bitcode())
+llvm.parse_bitcode = lambda code, context=None: read.append(len(code)) or parse(code, context)
+assert twice(1) == 2
+before = sum(length > empty for length in read)
+from arm_kernels.caller import answer
+print(answer(1), sum(twice.stats.cache_hits.values()), before, sum(length > empty for length in read) > before)
+print(sum(answer.stats.cache_hits.values()))
+"""
+    for name in ("callee", "caller"):
+        path = package / f"{name}.py"
+        path.write_text(path.read_text().replace("import kernel", "import bare_kernel as kernel"))
+    cache = tmp_path / "cache"
+    run(package, cache, program=look)
+    assert run(package, cache, program=look) == ["3", "1", "0", "False", "1"], "both are there: nothing is linked"
+    caller = package / "caller.py"
+    caller.write_text(caller.read_text().replace("+ 1", "+ 2"))
+    assert run(package, cache, program=look) == ["4", "1", "0", "True", "0"]
+    assert run(package, cache, program=look) == ["4", "1", "0", "False", "1"]
+
+
+def test_numbas_version_is_the_same_asked_both_ways() -> None:
+    numba = pytest.importorskip("numba")
+    assert numba.__version__ == metadata.version("numba"), "else a warm cache is told to be cold"
 
 
 def test_without_jit_the_plain_function_runs_and_nothing_is_written(package: Path, tmp_path: Path) -> None:
