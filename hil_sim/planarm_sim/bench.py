@@ -69,6 +69,10 @@ class SerialLine(Protocol):
     def idle_cycle(self) -> int:
         """Cycle at which the last byte written has passed."""
 
+    @property
+    def next_delivery_cycle(self) -> int:
+        """First cycle at which there may be bytes to read that are not there now."""
+
     def write(self, data: bytes) -> None:
         """Send bytes to the board."""
 

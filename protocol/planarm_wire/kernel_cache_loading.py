@@ -13,6 +13,7 @@ Both reach into parts of Numba that it does not document. Should a later Numba n
 
 from __future__ import annotations
 
+import importlib
 from collections.abc import Callable
 from functools import cache
 from typing import Any
@@ -84,11 +85,10 @@ def _symbols(codegen: Any, description: Any) -> tuple[set[str], set[str]] | None
 
 def _read_when_linked(library: Any, known: set[str], bitcode: bytes) -> None:  # noqa: ANN401
     """Give a library its module for linking when that is asked for."""
-    import llvmlite.binding as llvm  # noqa: PLC0415 - Numba has imported it
 
     def read() -> Any:  # noqa: ANN401
         del library._get_module_for_linking  # the class has its own again
-        library._shared_module = module = llvm.parse_bitcode(bitcode)
+        library._shared_module = module = _llvm().parse_bitcode(bitcode)
         for named in (module.functions, module.global_variables):
             known.update(value.name for value in named if not value.is_declaration)
         return module
@@ -99,6 +99,8 @@ def _read_when_linked(library: Any, known: set[str], bitcode: bytes) -> None:  #
 @cache
 def _no_bitcode() -> bytes:
     """Return a module with nothing in it."""
-    import llvmlite.binding as llvm  # noqa: PLC0415 - Numba has imported it
+    return bytes(_llvm().parse_assembly("").as_bitcode())
 
-    return bytes(llvm.parse_assembly("").as_bitcode())
+
+def _llvm() -> Any:  # noqa: ANN401
+    return importlib.import_module("llvmlite.binding")  # Numba has imported it

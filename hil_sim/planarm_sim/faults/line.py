@@ -84,6 +84,12 @@ class FaultyLine:
         waiting = self._waiting[TO_BOARD]
         return max(self._uno.serial.idle_cycle, waiting[-1][0] if waiting else 0)
 
+    @property
+    def next_delivery_cycle(self) -> int:
+        """First cycle at which there may be something to hand over that is not there now, either way."""
+        held = [waiting[0][0] for waiting in self._waiting.values() if waiting]
+        return max(self._uno.cycle + 1, min([self._uno.serial.next_delivery_cycle, *held]))
+
     def write(self, data: bytes) -> None:
         """Send bytes towards the board."""
         for byte in data:
