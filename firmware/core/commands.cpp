@@ -139,7 +139,6 @@ Result begin_home(Reader& fields, uint32_t now_ticks) {
     order.slow_ticks = fields.u32();
     order.most_usteps = fields.u32();
     order.back_usteps = fields.u32();
-    order.position_usteps = fields.i32();
     if (!is_whole(fields)) return Result::MALFORMED;
     if (positive > 1 || home::check(order) != Result::OK) return Result::OUT_OF_RANGE;
     if (!power::has_option(power::LIMIT_SWITCHES)) return Result::WRONG_STATE;

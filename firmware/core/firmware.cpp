@@ -109,6 +109,8 @@ void serve_limits(uint32_t now_ticks) {
             if (inputs::hit_joint() != wire::JOINTS)
                 fail(wire::Fault::LIMIT_SWITCH, inputs::hit_joint(), now_ticks);
             return;
+        case wire::State::READY:
+            return inputs::excuse_hit();
         default:
             return;
     }

@@ -1,7 +1,6 @@
 #include "home.h"
 
 #include "inputs.h"
-#include "motion.h"
 #include "segment.h"
 #include "step_engine.h"
 
@@ -23,15 +22,12 @@ Phase phase = Phase::NONE;
 uint32_t steps_left;
 uint32_t next_ticks;  // of the next step
 bool first_step;
-bool touched;  // the switch closed and may be bouncing
-int32_t touched_usteps;
 
 void enter(Phase next, uint32_t steps, uint32_t start_ticks) {
     phase = next;
     steps_left = steps;
     next_ticks = start_ticks;
     first_step = true;
-    touched = false;
 }
 
 uint32_t interval_ticks() { return phase == Phase::APPROACH ? order.fast_ticks : order.slow_ticks; }
@@ -56,27 +52,13 @@ bool feed(uint32_t now_ticks) {
     return true;
 }
 
-int32_t position() { return step_engine::position().usteps[order.joint]; }
-
-// Where the contact closed, before it bounced.
-void note_touch() {
-    const bool now = inputs::is_hit_now(order.joint);
-    if (now && !touched) touched_usteps = position();
-    touched = now || (touched && inputs::is_bouncing(order.joint));
-}
-
-void finish() {
-    const int32_t beyond = position() - touched_usteps;
-    motion::set_position(order.joint, order.position_usteps + beyond);
-    phase = Phase::NONE;
-}
-
 }  // namespace
 
 void reset() { phase = Phase::NONE; }
 
 wire::Result check(const Order& told) {
-    const bool slow_enough = told.fast_ticks >= MIN_REVERSAL_TICKS && told.slow_ticks >= told.fast_ticks;
+    const bool slow_enough = told.fast_ticks >= MIN_REVERSAL_TICKS && told.slow_ticks >= told.fast_ticks &&
+                             told.slow_ticks >= 2 * wire::DEBOUNCE_TICKS;
     const bool short_enough = told.slow_ticks <= wire::MAX_SEGMENT_TICKS;
     const bool good = told.joint < wire::JOINTS && slow_enough && short_enough && told.back_usteps != 0;
     return good ? wire::Result::OK : wire::Result::OUT_OF_RANGE;
@@ -100,7 +82,6 @@ uint8_t joint() { return order.joint; }
 Progress serve(uint32_t now_ticks) {
     if (phase == Phase::NONE) return Progress::NONE;
     if (!step_engine::serve(now_ticks)) return Progress::MISSED;
-    note_touch();
     const bool hit = inputs::is_hit(order.joint);
     const bool there = phase == Phase::BACK ? !hit : hit;
     if (!there) return feed(now_ticks) ? Progress::GOING : Progress::FAILED;
@@ -113,7 +94,7 @@ Progress serve(uint32_t now_ticks) {
             enter(Phase::TOUCH, order.back_usteps, now_ticks + PAUSE_TICKS);
             return Progress::GOING;
         default:
-            finish();
+            phase = Phase::NONE;
             return Progress::DONE;
     }
 }

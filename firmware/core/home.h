@@ -1,5 +1,6 @@
 // Homing of one joint: to its limit switch, off it, and slowly onto it again. The speeds are the host's,
-// meant to be below the start-stop speed: the joint starts and stops dead.
+// meant to be below the start-stop speed: the joint starts and stops dead. The count is left alone: what it
+// is at the switch tells the host how many steps were lost.
 #pragma once
 
 #include <stdint.h>
@@ -16,7 +17,6 @@ struct Order {
     uint32_t slow_ticks;
     uint32_t most_usteps;
     uint32_t back_usteps;
-    int32_t position_usteps;  // of the place where the switch closes
 };
 
 enum class Progress : uint8_t { NONE, GOING, DONE, FAILED, MISSED };

@@ -10,6 +10,7 @@ namespace {
 
 uint8_t raw;     // bit j: joint j, hit
 uint8_t steady;  // debounced
+uint8_t left;    // hit before the motion began, and not yet open since
 uint32_t changed_ticks;
 
 uint8_t read() {
@@ -25,7 +26,7 @@ bool is_set(uint8_t bits, uint8_t joint) { return ((bits >> joint) & 1) != 0; }
 }  // namespace
 
 void reset(uint32_t now_ticks) {
-    raw = steady = static_cast<uint8_t>(read() & JOINTS_MASK);
+    raw = steady = left = static_cast<uint8_t>(read() & JOINTS_MASK);
     changed_ticks = now_ticks;
 }
 
@@ -36,19 +37,18 @@ void serve(uint32_t now_ticks) {
         changed_ticks = now_ticks;
     } else if (steady != raw && now_ticks - changed_ticks >= wire::DEBOUNCE_TICKS) {
         steady = raw;
+        left &= steady;
     }
 }
 
+void excuse_hit() { left = steady; }
+
 bool is_hit(uint8_t joint) { return is_set(steady, joint); }
-
-bool is_hit_now(uint8_t joint) { return is_set(read(), joint); }
-
-bool is_bouncing(uint8_t joint) { return is_set(static_cast<uint8_t>(raw ^ steady), joint); }
 
 uint8_t hit_joint() {
     if (!power::has_option(power::LIMIT_SWITCHES)) return wire::JOINTS;
     for (uint8_t joint = 0; joint < wire::JOINTS; ++joint) {
-        if (is_hit(joint)) return joint;
+        if (is_set(static_cast<uint8_t>(steady & ~left), joint)) return joint;
     }
     return wire::JOINTS;
 }

@@ -16,12 +16,11 @@ void serve(uint32_t now_ticks);
 
 // As debounced.
 bool is_hit(uint8_t joint);
-// As the pin tells now.
-bool is_hit_now(uint8_t joint);
-// True when the pin has changed and not yet lasted.
-bool is_bouncing(uint8_t joint);
 
-// The first joint whose switch is hit, or wire::JOINTS; none when they are not watched.
+// A motion that begins now may leave the switches that are hit: they count again once they have been open.
+void excuse_hit();
+
+// The first joint whose switch is hit and not excused, or wire::JOINTS; none when they are not watched.
 uint8_t hit_joint();
 
 // As STATUS tells them.

@@ -11,7 +11,7 @@ namespace wire {
 // Both ends must have the same.
 constexpr uint8_t PROTOCOL_VERSION = 2;
 // Of the specification without its wording.
-constexpr uint32_t SPEC_HASH = 0x16178006UL;
+constexpr uint32_t SPEC_HASH = 0xA09583CFUL;
 
 // Ends every frame.
 constexpr uint8_t DELIMITER = 0x7E;
@@ -137,7 +137,9 @@ enum class MessageType : uint8_t {
     SOFT_LIMITS = 0xB,
     // From the host: Moves one joint to its limit switch and off it again, slowly the second time.
     // Only in state ready, with limit switches watched. The order of the joints is the host's. Ends
-    // in ready with the joint's position set, or in homing_failed.
+    // in ready with the joint where the switch closed, or in homing_failed. The ledger counts on:
+    // the host compares its count at the switch with the switch's place, which tells the steps
+    // lost, and sends SET_POSITION.
     HOME = 0xC,
     // From the host: Tells the position of an arm at rest: the ledger counts on from there. Only in
     // idle and ready.
@@ -300,16 +302,15 @@ constexpr uint8_t LEAST_USTEPS = 0;  // i32 x 2, usteps
 constexpr uint8_t MOST_USTEPS = 8;   // i32 x 2, usteps
 }  // namespace soft_limits_at
 
-// Home: payload of 22 bytes.
-constexpr uint8_t HOME_BYTES = 22;
+// Home: payload of 18 bytes.
+constexpr uint8_t HOME_BYTES = 18;
 namespace home_at {
-constexpr uint8_t JOINT = 0;             // u8
-constexpr uint8_t POSITIVE = 1;          // u8
-constexpr uint8_t FAST_TICKS = 2;        // u32, ticks
-constexpr uint8_t SLOW_TICKS = 6;        // u32, ticks
-constexpr uint8_t MOST_USTEPS = 10;      // u32, usteps
-constexpr uint8_t BACK_USTEPS = 14;      // u32, usteps
-constexpr uint8_t POSITION_USTEPS = 18;  // i32, usteps
+constexpr uint8_t JOINT = 0;         // u8
+constexpr uint8_t POSITIVE = 1;      // u8
+constexpr uint8_t FAST_TICKS = 2;    // u32, ticks
+constexpr uint8_t SLOW_TICKS = 6;    // u32, ticks
+constexpr uint8_t MOST_USTEPS = 10;  // u32, usteps
+constexpr uint8_t BACK_USTEPS = 14;  // u32, usteps
 }  // namespace home_at
 
 // SetPosition: payload of 8 bytes.

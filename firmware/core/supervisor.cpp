@@ -81,7 +81,7 @@ const Row ROWS[] HAL_FLASH = {
     {Event::DONE, State::RUNNING, State::READY, Outcome::NONE},
     {Event::DONE, State::HOLDING, State::READY, Outcome::NONE},
     {Event::DONE, State::STOPPING, State::READY, Outcome::NONE},
-    {Event::DONE, State::HOMING, State::READY, Outcome::NONE},
+    {Event::DONE, State::HOMING, State::READY, Outcome::DROP},
 };
 
 State current_state;

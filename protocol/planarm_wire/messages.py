@@ -13,7 +13,7 @@ from planarm_wire.layout import END, Field
 
 PROTOCOL_VERSION: Final = 2
 """Both ends must have the same."""
-SPEC_HASH: Final = 0x16178006
+SPEC_HASH: Final = 0xA09583CF
 """Hash of the specification without its wording."""
 DELIMITER: Final = 0x7E
 """Ends every frame."""
@@ -159,8 +159,9 @@ class MessageType(IntEnum):
     """From the host.
 
     Moves one joint to its limit switch and off it again, slowly the second time. Only in state ready, with limit
-    switches watched. The order of the joints is the host's. Ends in ready with the joint's position set, or in
-    homing_failed.
+    switches watched. The order of the joints is the host's. Ends in ready with the joint where the switch closed,
+    or in homing_failed. The ledger counts on: the host compares its count at the switch with the switch's place,
+    which tells the steps lost, and sends SET_POSITION.
     """
     SET_POSITION = 0xD
     """From the host. Tells the position of an arm at rest: the ledger counts on from there. Only in idle and ready."""
@@ -299,7 +300,7 @@ FAULT_WORDS: Final[dict[Fault, Words]] = {
     Fault.STOP_INPUT: Words("the stop input opened; the position is lost", "close the stop circuit, then home the arm"),
     Fault.LIMIT_SWITCH: Words(
         "a limit switch closed during a motion; detail tells the joint",
-        "move the arm off the switch by hand or jog, and check the limits of the plan",
+        "jog the arm off the switch, and check the limits of the plan",
     ),
     Fault.SOFT_LIMIT: Words(
         "a segment would leave a joint's soft limits; detail tells the joint",
@@ -536,7 +537,8 @@ class Config:
     """A set of bits.
 
     0: ENABLE is active high; 1: an emergency stop releases the drivers; 2: the stop input is watched; 3: limit
-    switches are watched; 4: limit switches open when hit. (u8)
+    switches are watched, and in motion only those that were open since it began, so that an arm can leave them; 4:
+    limit switches open when hit. (u8)
     """
     idle_ms: int
     """Drivers are released after so long in state ready; 0: never. (ms, u32)"""
@@ -573,9 +575,10 @@ class Home:
     """Moves one joint to its limit switch and off it again, slowly the second time.
 
     Only in state ready, with limit switches watched. The order of the joints is the host's. Ends in ready with the
-    joint's position set, or in homing_failed.
+    joint where the switch closed, or in homing_failed. The ledger counts on: the host compares its count at the
+    switch with the switch's place, which tells the steps lost, and sends SET_POSITION.
 
-    From the host, payload 22 bytes.
+    From the host, payload 18 bytes.
     """
 
     TYPE: ClassVar[MessageType] = MessageType.HOME
@@ -587,13 +590,14 @@ class Home:
     fast_ticks: int
     """Interval of the steps towards the switch. (ticks, u32)"""
     slow_ticks: int
-    """Interval of the steps off it and onto it again. (ticks, u32)"""
+    """Interval of the steps off it and onto it again, at least fast_ticks and twice debounce_ticks, so that the joint rests on the very step at which the switch closed.
+
+    (ticks, u32)
+    """
     most_usteps: int
     """Farthest way to the switch. (usteps, u32)"""
     back_usteps: int
     """Farthest way off the switch. (usteps, u32)"""
-    position_usteps: int
-    """Of the place where the switch closes. (usteps, i32)"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -774,7 +778,6 @@ LAYOUTS: Final[dict[type[Message | Struct], tuple[Field, ...]]] = {
         Field("slow_ticks", "u32"),
         Field("most_usteps", "u32"),
         Field("back_usteps", "u32"),
-        Field("position_usteps", "i32"),
     ),
     SetPosition: (Field("position_usteps", "i32", repeat=2),),
     Welcome: (

@@ -59,7 +59,7 @@ def scripts() -> list[bytes]:
         moving + wait(2) + record(LINE, bytes([EMERGENCY_CODE] * 3)) + wait(2),
         frame(Config(PinMap.OWN, 2, 1, 0b1100, 0, 0, 56, (160_000, 160_000)))
         + awake
-        + frame(Home(0, 1, 3000, 9000, 400, 100, 0))
+        + frame(Home(0, 1, 3000, 160_000, 400, 100))
         + wait(20)
         + bytes([INPUTS, 1])
         + wait(20),

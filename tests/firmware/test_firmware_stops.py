@@ -224,9 +224,33 @@ def test_a_limit_hit_in_motion_is_a_fault_that_says_which_and_a_bounce_is_none(f
     assert status.ledger.position_usteps[0] == board.position_at(0, board.now)
 
 
+def test_an_arm_leaves_a_switch_and_is_watched_again(firmware: Firmware) -> None:
+    """As after homing: what is hit when a motion begins counts once it has been open."""
+    board = Board(firmware)
+    switches = Switches(firmware)
+    board.hello()
+    board.ask(replace(WIRING, options=LIMITS))
+    board.ask(Enable(1))
+    switches.set(hit=0b10)
+    board.run(WAKE_TICKS + DEBOUNCE_TICKS)
+    moving(board)
+    board.run(3 * DEBOUNCE_TICKS)
+    assert board.ask_now().state is State.RUNNING
+    switches.set()
+    board.run(DEBOUNCE_TICKS + 60_000)
+    assert board.ask_now().state is State.RUNNING
+    switches.set(hit=0b10)
+    board.run(DEBOUNCE_TICKS + 60_000)
+    status = board.ask()
+    assert (status.fault, status.detail) == (Fault.LIMIT_SWITCH, 1)
+
+
 @pytest.mark.parametrize("begins_on_the_switch", [False, True])
-def test_homing_finds_the_place_where_the_switch_closes(firmware: Firmware, begins_on_the_switch: bool) -> None:
-    # The switch closes at -40 usteps of joint 2 from here; the position there shall be 1000.
+@pytest.mark.parametrize("bounces", [False, True])
+def test_homing_ends_on_the_step_where_the_switch_closes(
+    firmware: Firmware, begins_on_the_switch: bool, bounces: bool
+) -> None:
+    """The ledger counts on; the switch closes at `closes_at` usteps of joint 2."""
     closes_at = 5 if begins_on_the_switch else -40
     board = Board(firmware)
     switches = Switches(firmware)
@@ -235,17 +259,28 @@ def test_homing_finds_the_place_where_the_switch_closes(firmware: Firmware, begi
     board.ask(Enable(1))
     switches.set(hit=0b10 if begins_on_the_switch else 0)
     board.run(WAKE_TICKS)
-    assert board.ask(Home(1, 0, 20_000, 100_000, 200, 100, 1000)).state is State.HOMING
+    assert board.ask(Home(1, 0, 20_000, 2 * DEBOUNCE_TICKS, 200, 100)).state is State.HOMING
+    rest_ticks = 0
     for _ in range(20_000):
         board.run(2000)
-        place = board.position_at(1, board.now)
-        switches.set(hit=0b10 if place <= closes_at else 0)
+        pressed = board.position_at(1, board.now) <= closes_at
+        rest_ticks = rest_ticks + 2000 if pressed else 0
+        open_again = bounces and 4000 < rest_ticks < 12_000  # for half a millisecond
+        switches.set(hit=0b10 if pressed and not open_again else 0)
         if board.replies and board.replies[-1][1].state is not State.HOMING:  # type: ignore[union-attr]
             break
     status = board.ask()
     assert (status.state, status.fault) == (State.READY, Fault.NONE)
-    assert abs(status.ledger.position_usteps[1] - (board.position_at(1, board.now) - closes_at + 1000)) <= 1
-    assert status.ledger.position_usteps[0] == 0
+    assert status.ledger.position_usteps == (0, closes_at)
+
+
+def test_a_touch_too_fast_for_the_debouncing_is_refused(firmware: Firmware) -> None:
+    board = Board(firmware)
+    board.hello()
+    board.ask(replace(WIRING, options=LIMITS))
+    board.ask(Enable(1))
+    board.run(WAKE_TICKS)
+    assert board.ask(Home(1, 0, 20_000, 2 * DEBOUNCE_TICKS - 1, 200, 100)).refusal is Result.OUT_OF_RANGE
 
 
 def test_homing_without_a_switch_fails_within_its_distance(firmware: Firmware) -> None:
@@ -256,7 +291,7 @@ def test_homing_without_a_switch_fails_within_its_distance(firmware: Firmware) -
     board.ask(Enable(1))
     switches.set()
     board.run(WAKE_TICKS)
-    board.ask(Home(0, 1, 20_000, 100_000, 30, 100, 0))
+    board.ask(Home(0, 1, 20_000, 160_000, 30, 100))
     board.run(30 * 20_000 + 200_000)
     status = board.ask()
     assert (status.state, status.fault, status.detail) == (State.FAULT, Fault.HOMING_FAILED, 0)

@@ -1,20 +1,18 @@
-"""Zero, home, jog, goto, and the refusal to run from anywhere else: on the emulated board, judged by its pins."""
+"""Zero, jog, goto, and the refusal to run from anywhere else: on the emulated board, judged by its pins."""
 
 import json
-from dataclasses import asdict, replace
+from dataclasses import asdict
 
 import numpy as np
 import pytest
 
 from broken_runs import SCENE, board
 from planarm.cli.main import main
-from planarm.errors import LinkError, NoPathError, SceneError, UsageError
-from planarm.link.arm_record import ArmSetup
+from planarm.errors import LinkError, NoPathError, UsageError
 from planarm.link.positions import Positions
-from planarm.link.transport import open_transport
-from planarm.operations.arm_moves import goto, home, jog
+from planarm.operations.arm_moves import goto, jog
 from planarm.plan_file import arm_hash
-from planarm.scene import LimitSwitchSpec, load_scene
+from planarm.scene import load_scene
 from planarm.streaming.standing import look, pose_of, require_standing, tell, usteps_at
 
 PORT = "/dev/ttyUNO"
@@ -88,33 +86,6 @@ def test_a_jog_of_a_known_arm_keeps_clear_of_obstacles(scene, positions):
     with pytest.raises(NoPathError, match="cannot be proved free"):
         jog(line, scene, look(line, PORT, scene, positions), 0, np.radians(75.0), nothing)
     assert rises(line, "D9") == 0
-
-
-SWITCHES = (
-    LimitSwitchSpec(1, "A1", np.radians(43.0), True, 0.001),
-    LimitSwitchSpec(2, "A2", np.radians(-63.0), False, 0.001),
-)
-
-
-def test_homing_finds_the_switches_and_the_position(scene, positions):
-    """The emulated arm stands where the host does not know it to; its switches tell."""
-    switched = replace(scene, limit_switches=SWITCHES)
-    start = usteps_at(scene, scene.task.start_cm)
-    line = open_transport("sim://", 250_000, ArmSetup(switched, start))
-    line.clock.wait_until(0.05)
-    home(line, PORT, switched, positions)
-    standing = look(line, PORT, switched, positions)
-    assert standing.how == "homed"
-    line.arm.settle(0.2)
-    really_rad = line.arm.record().q_rad[-1]
-    told_rad, _ = pose_of(switched, standing.usteps)
-    np.testing.assert_allclose(told_rad, really_rad, atol=np.radians(0.2))
-    assert standing.usteps != start
-
-
-def test_homing_needs_a_switch_on_every_joint(scene, positions):
-    with pytest.raises(SceneError, match=r"limit_switches: joints \[2\] have none"):
-        home(board(), PORT, replace(scene, limit_switches=SWITCHES[:1]), positions)
 
 
 def test_positions_are_kept_by_port_boot_and_arm(scene, positions):

@@ -235,6 +235,11 @@ def _add_arm(commands: Commands) -> None:
     parsers["zero"].add_argument(
         "--at", nargs=2, type=float, metavar=("X", "Y"), help="the tip's place in cm (default: the task's start)"
     )
+    parsers["home"].add_argument(
+        "--prove",
+        action="store_true",
+        help="touch the switches again after a run and tell the steps lost since homing, a joint each",
+    )
     parsers["jog"].add_argument("joint", type=_count, metavar="JOINT", help="from 1")
     parsers["jog"].add_argument("degrees", type=float, metavar="DEGREES", help="counter-clockwise above 0")
     parsers["goto"].add_argument("x_cm", type=float, metavar="X", help="in cm")

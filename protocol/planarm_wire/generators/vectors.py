@@ -62,7 +62,7 @@ _MESSAGES: Final[tuple[m.Message, ...]] = (
     m.Stop(1),
     m.Config(m.PinMap.OWN, m.JOINTS, 0b10, 0b111, 60_000, 160_000, 56, (160_000, _STUFFED_U32)),
     m.SoftLimits((-(2**31), 0), (2**31 - 1, -1)),
-    m.Home(1, 1, 8_000, 40_000, 20_000, 400, -_STUFFED_U32),
+    m.Home(1, 1, 8_000, 160_000, 20_000, _STUFFED_U32),
     m.SetPosition((-1, _STUFFED_U32)),
     m.Welcome(m.PROTOCOL_VERSION, 1, 2, 0x01234567, (1, 2, 3), m.Reset.POWER_ON, 0, m.JOINTS, m.Ledger(0, (0, 0))),
     m.Welcome(

@@ -1,0 +1,211 @@
+"""Homing: every joint to its limit switch; and the proof of lost steps, which is the same motion, counted.
+
+The device counts on while a joint is moved to its switch. What it counted where the switch closed, less where the
+switch is, are the steps that the motor was told and did not make. A rotor falls back into step only by whole turns of
+its field, four full steps each; so a difference tells their number without doubt as long as the switch repeats within
+two full steps, and what is left over is the switch's own play.
+"""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass, replace
+
+import numpy as np
+
+from planarm.errors import DeviceFault, LinkError, SceneError
+from planarm.link.exchange import open_session, request
+from planarm.link.positions import Positions
+from planarm.link.session import Session, fault_words
+from planarm.link.stream import config_of
+from planarm.link.transport import Transport
+from planarm.model.transmission import Transmission, motor_axes
+from planarm.plan_file import arm_hash
+from planarm.scene import JointSpec, LimitSwitchSpec, Scene
+from planarm.stepping.windows import start_stop_ticks
+from planarm_wire.messages import DEBOUNCE_TICKS, Clear, Enable, Fault, Home, Query, SetPosition, State, Stop
+
+WATCH_SWITCHES = 1 << 3
+"""CONFIG's option: limit switches are watched."""
+FIELD_FULL_STEPS = 4
+"""A turn of the field: where a rotor that lost its step can fall in again."""
+HOMING_SLOWER = 4
+SETTLED_TICKS = 3 * DEBOUNCE_TICKS
+"""Least interval of the steps onto the switch: it is believed before the next step, also after bouncing."""
+BACK_RAD = np.radians(15.0)
+HOMING_POLL_S = 0.05
+HOMING_LIMIT_S = 120.0
+HOMED = "homed"
+
+
+@dataclass(frozen=True, slots=True)
+class Touched:
+    """One joint at its switch.
+
+    Attributes:
+        joint: from 1.
+        counted_usteps: the device's count where the switch closed.
+        switch_usteps: where the switch is, by the scene.
+        field_usteps: micro-steps of a turn of the motor's field.
+    """
+
+    joint: int
+    counted_usteps: int
+    switch_usteps: int
+    field_usteps: int
+
+    @property
+    def off_usteps(self) -> int:
+        """The count is so much farther than the joint is."""
+        return self.counted_usteps - self.switch_usteps
+
+    @property
+    def lost_usteps(self) -> int:
+        """Steps lost: the nearest whole number of the field's turns, with the sign of the steps that were told."""
+        return self.field_usteps * round(self.off_usteps / self.field_usteps)
+
+    @property
+    def play_usteps(self) -> int:
+        """What is left of the difference: how well the switch repeats."""
+        return self.off_usteps - self.lost_usteps
+
+
+@dataclass(frozen=True, slots=True)
+class Homed:
+    """Every joint's touch, in the order of the joints, and by what the count was known before (None: it was not)."""
+
+    touched: tuple[Touched, ...]
+    known_by: str | None
+
+    @property
+    def usteps(self) -> tuple[int, ...]:
+        """Where the motors stand: at their switches."""
+        return tuple(touch.switch_usteps for touch in self.touched)
+
+    @property
+    def kept_usteps(self) -> tuple[int, ...]:
+        """Where the motors stand by the old count less what was lost: free of the switches' play."""
+        return tuple(touch.counted_usteps - touch.lost_usteps for touch in self.touched)
+
+    @property
+    def lost_usteps(self) -> tuple[int, ...] | None:
+        """Steps lost since the position was told, each joint's; None: it was not known."""
+        return None if self.known_by is None else tuple(touch.lost_usteps for touch in self.touched)
+
+
+def home(transport: Transport, port: str, scene: Scene, positions: Positions) -> Homed:
+    """Move every joint to its limit switch, in the scene's order of switches, and take the position from there.
+
+    Raises:
+        SceneError: a joint has no switch, or motors move several joints.
+        DeviceFault: a switch was not found; the drivers hold.
+        LinkError: the line failed.
+    """
+    session, known_by = _ready(transport, port, scene, positions)
+    homed = Homed(_touch_all(transport, session, scene), known_by)
+    return _settle(transport, port, scene, positions, session, homed, homed.usteps)
+
+
+def prove_steps(transport: Transport, port: str, scene: Scene, positions: Positions) -> Homed:
+    """Touch every switch again and tell the steps lost since homing; the count is corrected by exactly those.
+
+    Raises:
+        SceneError, DeviceFault: as `home`.
+        LinkError: the line failed, or the board has restarted since the arm was homed, so that nothing can be told.
+    """
+    session, known_by = _ready(transport, port, scene, positions)
+    if known_by != HOMED:
+        raise LinkError(
+            f"nothing to compare with: since the board's last start the arm's place is {known_by or 'not known'}, not"
+            " homed; 'planarm home SCENE' before the run, then ask again after it"
+        )
+    homed = Homed(_touch_all(transport, session, scene), known_by)
+    return _settle(transport, port, scene, positions, session, homed, homed.kept_usteps)
+
+
+def _ready(transport: Transport, port: str, scene: Scene, positions: Positions) -> tuple[Session, str | None]:
+    """Make the device ready for homing; return by what its count is known, too."""
+    axes = motor_axes(scene.joints, scene.coupling)
+    switched = {switch.joint for switch in scene.limit_switches}
+    missing = [number for number in range(1, len(scene.joints) + 1) if number not in switched]
+    if missing or not np.array_equal(np.array(scene.coupling), np.eye(len(scene.joints))):
+        raise SceneError(
+            scene.source,
+            "limit_switches",
+            f"joints {missing} have none" if missing else "homing is for motors that each move one joint",
+        )
+    session = open_session(transport)
+    assert session.welcome is not None, "an open session has a welcome"
+    known_by = positions.how(port, session.welcome.boot_nonce, arm_hash(asdict(scene)))
+    if request(transport, session, Query()).state is not State.IDLE:
+        request(transport, session, Clear())
+    told = config_of([start_stop_ticks(axis) for axis in axes])
+    request(transport, session, replace(told, options=WATCH_SWITCHES))
+    request(transport, session, Enable(1))
+    return session, known_by
+
+
+def _touch_all(transport: Transport, session: Session, scene: Scene) -> tuple[Touched, ...]:
+    touched = {}
+    for switch in scene.limit_switches:
+        number, axis = switch.joint - 1, scene.joints[switch.joint - 1]
+        request(transport, session, _home_order(scene, switch))
+        _wait_for_switch(transport, session, switch)
+        assert session.status is not None, "a session that was answered has a status"
+        counted = session.status.ledger.position_usteps[number]
+        touched[number] = Touched(switch.joint, counted, _place_usteps(scene, switch), _field_usteps(axis))
+    return tuple(touched[number] for number in sorted(touched))
+
+
+def _settle(
+    transport: Transport,
+    port: str,
+    scene: Scene,
+    positions: Positions,
+    session: Session,
+    homed: Homed,
+    usteps: tuple[int, ...],
+) -> Homed:
+    """Tell the device where its arm stands, and note that it knows."""
+    request(transport, session, SetPosition(usteps))
+    assert session.welcome is not None, "an open session has a welcome"
+    positions.remember(port, session.welcome.boot_nonce, arm_hash(asdict(scene)), HOMED)
+    return homed
+
+
+def _place_usteps(scene: Scene, switch: LimitSwitchSpec) -> int:
+    """Where a switch is, in its motor's micro-steps."""
+    at_rad = np.zeros(len(scene.joints))
+    at_rad[switch.joint - 1] = switch.at_rad
+    return int(np.floor(Transmission.of(scene).usteps(at_rad)[switch.joint - 1] + 0.5))
+
+
+def _field_usteps(axis: JointSpec) -> int:
+    return FIELD_FULL_STEPS * axis.microsteps
+
+
+def _home_order(scene: Scene, switch: LimitSwitchSpec) -> Home:
+    """Go to the switch at the start-stop speed, where motors may stop dead, and slowly off it and on again."""
+    number = switch.joint - 1
+    axis = scene.joints[number]
+    low, high = scene.arm.joint_limits_rad[number]
+    fast = max(start_stop_ticks(axis), 600)
+    return Home(
+        joint=number,
+        positive=int(switch.above != axis.reversed),
+        fast_ticks=fast,
+        slow_ticks=max(HOMING_SLOWER * fast, SETTLED_TICKS),
+        most_usteps=int((min(high - low, 4.0 * np.pi) + 2.0 * BACK_RAD) * axis.usteps_per_rad),
+        back_usteps=int(BACK_RAD * axis.usteps_per_rad),
+    )
+
+
+def _wait_for_switch(transport: Transport, session: Session, switch: LimitSwitchSpec) -> None:
+    clock = transport.clock
+    limit_s = clock.now_s() + HOMING_LIMIT_S
+    while (status := request(transport, session, Query())).state is State.HOMING:
+        if clock.now_s() > limit_s:
+            request(transport, session, Stop(1))
+            raise LinkError(f"joint {switch.joint}: no switch within {HOMING_LIMIT_S:g} s; it was stopped")
+        clock.wait_until(clock.now_s() + HOMING_POLL_S)
+    if status.fault is not Fault.NONE:
+        raise DeviceFault(f"joint {switch.joint}: {fault_words(status.fault)}")
