@@ -72,14 +72,14 @@ def test_the_arm_leaves_its_switches_and_nothing_is_lost(scene, positions):
 def test_a_jammed_rotors_loss_is_told_and_the_count_mended(scene, positions, tmp_path, joint):
     """The plant counts what it lost by itself; the proof knows the device's count and the switches only."""
     jam = tmp_path / "jam.toml"
-    jam.write_text(f'[[faults]]\nkind = "mechanics.stall"\njoint = {joint}\nat_s = {MOTION_S + 0.15}\nfor_s = 0.1\n')
+    jam.write_text(f'[[faults]]\nkind = "mechanics.stall"\njoint = {joint}\nat_s = {MOTION_S}\nfor_s = 1.0\n')
     line = arm_of(scene, jam)
     home(line, PORT, scene, positions)
     goto(line, scene, look(line, PORT, scene, positions), scene.task.start_cm, lambda _told: None)
     assert line.clock.now_s() < MOTION_S
     line.clock.wait_until(MOTION_S)
     goto(line, scene, look(line, PORT, scene, positions), scene.task.goal_cm, lambda _told: None)
-    line.arm.settle(0.3)
+    line.arm.settle(1.0)
     truth = line.arm.record().lost_full_steps
     assert truth[joint - 1] != 0
     proof = prove_steps(line, PORT, scene, positions)
