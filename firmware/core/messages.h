@@ -137,9 +137,9 @@ enum class MessageType : uint8_t {
     SOFT_LIMITS = 0xB,
     // From the host: Moves one joint to its limit switch and off it again, slowly the second time.
     // Only in state ready, with limit switches watched. The order of the joints is the host's. Ends
-    // in ready with the joint where the switch closed, or in homing_failed. The ledger counts on:
-    // the host compares its count at the switch with the switch's place, which tells the steps
-    // lost, and sends SET_POSITION.
+    // in ready with the joint on the step at which the switch closed, or in homing_failed. The
+    // ledger counts on: the host compares its count at the switch with the switch's place, which
+    // tells the steps lost, and sends SET_POSITION.
     HOME = 0xC,
     // From the host: Tells the position of an arm at rest: the ledger counts on from there. Only in
     // idle and ready.

@@ -295,11 +295,11 @@ def run_scene(
             for line in seen.notes() if log.samples else ():
                 error.add_note(line)
             figures = {**planned_figures(plan), **seen_figures(seen.findings, seen.arm)}
-            finish_run_folder(out, Outcome(plan, figures, tuple(log.samples), seen, error.told()))
+            finish_run_folder(out, Outcome(plan, figures, tuple(log.samples), seen, error.told(), log.resent))
             raise
         seen = look_at(plan, transport, 0.0, kept)
     summary = summarise(plan, streamed, seen.findings, seen.arm) | (kept.figures() if kept else {})
-    finish_run_folder(out, Outcome(plan, summary, tuple(log.samples), seen))
+    finish_run_folder(out, Outcome(plan, summary, tuple(log.samples), seen, resent=log.resent))
     if seen.findings and not seen.findings.comparison.agrees:
         raise StepsDifferError(f"{scene.source}: {seen.findings.comparison.explain()}; see {out}")
     if seen.arm and not seen.arm.clean:

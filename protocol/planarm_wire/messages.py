@@ -159,9 +159,9 @@ class MessageType(IntEnum):
     """From the host.
 
     Moves one joint to its limit switch and off it again, slowly the second time. Only in state ready, with limit
-    switches watched. The order of the joints is the host's. Ends in ready with the joint where the switch closed,
-    or in homing_failed. The ledger counts on: the host compares its count at the switch with the switch's place,
-    which tells the steps lost, and sends SET_POSITION.
+    switches watched. The order of the joints is the host's. Ends in ready with the joint on the step at which the
+    switch closed, or in homing_failed. The ledger counts on: the host compares its count at the switch with the
+    switch's place, which tells the steps lost, and sends SET_POSITION.
     """
     SET_POSITION = 0xD
     """From the host. Tells the position of an arm at rest: the ledger counts on from there. Only in idle and ready."""
@@ -575,8 +575,8 @@ class Home:
     """Moves one joint to its limit switch and off it again, slowly the second time.
 
     Only in state ready, with limit switches watched. The order of the joints is the host's. Ends in ready with the
-    joint where the switch closed, or in homing_failed. The ledger counts on: the host compares its count at the
-    switch with the switch's place, which tells the steps lost, and sends SET_POSITION.
+    joint on the step at which the switch closed, or in homing_failed. The ledger counts on: the host compares its
+    count at the switch with the switch's place, which tells the steps lost, and sends SET_POSITION.
 
     From the host, payload 18 bytes.
     """
@@ -590,10 +590,7 @@ class Home:
     fast_ticks: int
     """Interval of the steps towards the switch. (ticks, u32)"""
     slow_ticks: int
-    """Interval of the steps off it and onto it again, at least fast_ticks and twice debounce_ticks, so that the joint rests on the very step at which the switch closed.
-
-    (ticks, u32)
-    """
+    """Interval of the steps off it and onto it again; at least fast_ticks, and 2 debounce_ticks. (ticks, u32)"""
     most_usteps: int
     """Farthest way to the switch. (usteps, u32)"""
     back_usteps: int

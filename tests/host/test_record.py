@@ -83,6 +83,17 @@ def test_a_jammed_rotor_is_red_with_every_slip_at_its_moment(tmp_path):
     assert injected[0] == pytest.approx(0.1, abs=0.02)
 
 
+def test_what_is_sent_again_is_on_the_time_axis(tmp_path):
+    summary = run_scene(SCENE, "sim://", tmp_path, quiet, faults=SCENARIOS / "line_drop.toml")
+    record = read_record(tmp_path)
+    again = [event for event in record["events"] if "sent again" in event["text"]]
+    assert sum(int(event["text"].split()[0]) for event in again) == summary["retransmissions"] > 0
+    assert all(event["lane"] == "line" and event["severity"] == "warn" for event in again)
+    assert all(event["t_s"] < record["stream"]["t_s"][-1] for event in again)
+    moments = record["stream"]["t_s"]
+    assert len(set(moments)) == len(moments), "a resending is no status of its own"
+
+
 def test_a_pulled_cable_leaves_a_whole_folder_with_the_error_in_it(tmp_path):
     record = failed(tmp_path, "line_unplug.toml", LinkError)
     assert record["error"]["kind"] == "StreamError"

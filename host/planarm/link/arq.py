@@ -47,6 +47,15 @@ class Ack(Enum):
     STRAY = auto()  # names a frame that was never sent: the device does not have our sequence
 
 
+@dataclass(frozen=True, slots=True)
+class Resent:
+    """Frames that were sent again: when, how many, and whether no answer came in time (else the device asked)."""
+
+    at_s: float
+    frames: int
+    unanswered: bool
+
+
 @dataclass(slots=True)
 class ArqCounters:
     """What the sender did since the session's start."""
@@ -77,6 +86,7 @@ class GoBackN:
         self.bytes_in_flight = 0
         self.room_in_flight = 0
         self.counters = ArqCounters()
+        self.resent: list[Resent] = []
         self.answered_s: float | None = None
         """When the newest acknowledged frame was first sent: every later reply was made after that."""
         self._outstanding: deque[_Outstanding] = deque()
@@ -146,7 +156,7 @@ class GoBackN:
             return b""
         self._patience *= BACK_OFF
         self.counters.timeouts += 1
-        return self._go_back(now_s)
+        return self._go_back(now_s, unanswered=True)
 
     @property
     def _wait_s(self) -> float:
@@ -161,9 +171,9 @@ class GoBackN:
         self.counters.repeated_acks += 1
         if now_s < self._deaf_until_s or now_s - self._outstanding[0].sent_s < self._least_s:
             return b""
-        return self._go_back(now_s)
+        return self._go_back(now_s, unanswered=False)
 
-    def _go_back(self, now_s: float) -> bytes:
+    def _go_back(self, now_s: float, *, unanswered: bool) -> bytes:
         copies = _LEAD
         for outstanding in self._outstanding:
             outstanding.sent_s = now_s
@@ -171,6 +181,7 @@ class GoBackN:
             copies += outstanding.frame
         self._timer_s = now_s
         self._deaf_until_s = now_s + self._wait_s
+        self.resent.append(Resent(now_s, len(self._outstanding), unanswered))
         self.counters.retransmissions += len(self._outstanding)
         self.counters.bytes_sent += len(copies)
         return copies

@@ -8,10 +8,11 @@ read as cleanly framed re-arms its 1 s watchdog, so after two quick tries the pa
 No I/O: the session is fed with bytes and times; `take_output` returns what is to be written.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from planarm.errors import DeviceFault, LinkError
-from planarm.link.arq import Ack, ArqCounters, GoBackN
+from planarm.link.arq import Ack, ArqCounters, GoBackN, Resent
 from planarm.link.clock_sync import ClockSync, Span
 from planarm_wire.codec import decode, encode, encoded_bytes
 from planarm_wire.errors import WireError
@@ -122,6 +123,11 @@ class Session:
     def round_trip_s(self) -> float:
         """From a frame to its acknowledgement, as last measured; 0 before."""
         return self._arq.round_trip_s
+
+    @property
+    def resent(self) -> Sequence[Resent]:
+        """What was sent again since the session's start, in order of time."""
+        return self._arq.resent
 
     @property
     def room_in_flight(self) -> int:

@@ -88,6 +88,7 @@ class Stream:
         self._ends_ticks = tuple(accumulate((duration_ticks(segment) for segment in segments), initial=0))
         self._path_time = PathTime(self._segments, self._ends_ticks, self.steps)
         self._seen: Status | None = None
+        self._told_resent = 0
         self._executed = 0
         self._executed_s = 0.0
         self._packer = Packer(session, segments, self._options.allowances)
@@ -340,7 +341,10 @@ class Stream:
 
     def _follow(self, now_s: float) -> None:
         status = self._session.status
-        if status is None or status is self._seen or self.ledger_before is None:
+        if status is None or self.ledger_before is None:
+            return
+        if status is self._seen:
+            self._tell_resent(status, now_s)
             return
         self._seen = status
         executed = executed_since(self.ledger_before, status.ledger)
@@ -354,10 +358,19 @@ class Stream:
         queued = self.sent_segments - executed
         if self.phase is Phase.RUNNING and self.sent_segments < len(self._segments):
             self.least_queued = min(self.least_queued, queued)
-        if self._on_progress is not None:
-            self._on_progress(self._progress(status, queued, now_s))
+        self._tell(status, now_s)
 
-    def _progress(self, status: Status, queued: int, now_s: float) -> StreamProgress:
+    def _tell_resent(self, status: Status, now_s: float) -> None:
+        """Tell at once what is sent again, without waiting for an answer that may never come."""
+        if len(self._session.resent) != self._told_resent:
+            self._tell(status, now_s)
+
+    def _tell(self, status: Status, now_s: float) -> None:
+        self._told_resent = len(self._session.resent)
+        if self._on_progress is not None:
+            self._on_progress(self._progress(status, now_s))
+
+    def _progress(self, status: Status, now_s: float) -> StreamProgress:
         assert self.ledger_before is not None
         moved = moved_usteps(self.ledger_before, status.ledger)
         return StreamProgress(
@@ -365,7 +378,7 @@ class Stream:
             total_s=self._ends_ticks[-1] / TICKS_HZ,
             executed_segments=self._executed,
             total_segments=len(self._segments),
-            queued_segments=queued,
+            queued_segments=self.sent_segments - self._executed,
             moved_usteps=moved,
             state=status.state,
             at_s=now_s,
@@ -374,6 +387,7 @@ class Stream:
             rate_percent=status.rate_percent,
             made_s=self._session.made_s,
             path_span_s=self._path_time.span_s(self._executed, moved),
+            resent=tuple(self._session.resent),
         )
 
     def _stall_due_s(self) -> float:

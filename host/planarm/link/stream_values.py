@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import Enum, auto
 
+from planarm.link.arq import Resent
 from planarm.link.clock_sync import Span
 from planarm_wire.messages import DEFAULT_WAKE_TICKS, Config, Ledger, PinMap, State
 from planarm_wire.rates import Allowance
@@ -59,6 +60,8 @@ class StreamProgress:
     """When the status was made, on the transport's clock: surely within these."""
     path_span_s: Span
     """Where on the path the motion was then: after the last step made, before the next."""
+    resent: tuple[Resent, ...] = ()
+    """What was sent again so far, in order of time."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -36,7 +36,7 @@ def events_of(outcome: Outcome) -> list[dict[str, Any]]:
     start_s = outcome.start_s
     found = [*_ends(outcome)]
     if start_s is not None:
-        found += [*_states(outcome, start_s)]
+        found += [*_states(outcome, start_s), *_resent(outcome, start_s)]
         if outcome.seen.arm is not None:
             found += [*_injected(outcome.seen.arm, start_s), *_arm(outcome.seen.arm, outcome.seen.start_tick)]
     found.sort(key=lambda event: event.t_s)
@@ -76,6 +76,14 @@ def _states(outcome: Outcome, start_s: float) -> Iterator[Event]:
         if sample.state in ("running", "ready", "idle"):
             severity = "info"
         yield Event(sample.at_s - start_s, "device", severity, sample.state, end_s - start_s)
+
+
+def _resent(outcome: Outcome, start_s: float) -> Iterator[Event]:
+    """Yield what was sent again, no more than MOST_OF_A_KIND."""
+    for again in outcome.resent[:MOST_OF_A_KIND]:
+        what = "1 frame" if again.frames == 1 else f"{again.frames} frames"
+        why = "no answer came in time" if again.unanswered else "the device missed one"
+        yield Event(again.at_s - start_s, "line", "warn", f"{what} sent again: {why}")
 
 
 def _injected(arm: ArmFindings, start_s: float) -> Iterator[Event]:

@@ -11,6 +11,7 @@ from planarm_wire.messages import TICKS_HZ
 from planarm_wire.steps import duration_ticks
 
 if TYPE_CHECKING:
+    from planarm.link.arq import Resent
     from planarm.link.stream import StreamProgress
     from planarm.link.transport import PinTrace
     from planarm.plan import Findings, Plan
@@ -41,13 +42,16 @@ class StreamLog:
 
     def __init__(self) -> None:
         self.samples: list[StreamSample] = []
+        self.resent: tuple[Resent, ...] = ()
 
     def note(self, told: StreamProgress) -> None:
-        """Keep one progress message."""
+        """Keep one progress message; one that only tells what was sent again is no new sample."""
         at_s, path_s = told.made_s.most, told.path_span_s.least
-        self.samples.append(
-            StreamSample(at_s, path_s, told.executed_segments, told.queued_segments, told.state.name.lower())
-        )
+        if len(told.resent) == len(self.resent) or not self.samples or self.samples[-1].at_s != at_s:
+            self.samples.append(
+                StreamSample(at_s, path_s, told.executed_segments, told.queued_segments, told.state.name.lower())
+            )
+        self.resent = told.resent
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -81,6 +85,7 @@ class Outcome:
         samples: what the device told while it was streamed.
         seen: what pins and arm showed.
         error: why the run ended early, as the command line tells it; None when it did not.
+        resent: what was sent again, on the transport's clock.
     """
 
     plan: Plan
@@ -88,6 +93,7 @@ class Outcome:
     samples: tuple[StreamSample, ...] = ()
     seen: Seen = Seen()
     error: Mapping[str, Any] | None = None
+    resent: tuple[Resent, ...] = ()
 
     @property
     def start_s(self) -> float | None:
