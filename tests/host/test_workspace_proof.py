@@ -298,12 +298,13 @@ def test_a_thin_obstacle_between_two_free_ends_is_found():
 
 
 def test_a_move_that_grazes_the_margin_stays_unproved():
-    """The tip slides 1e-6 cm outside the margin of a circle's lowest point, elbow far above."""
+    """The tip slides 1e-10 cm outside the margin of a circle's lowest point: not told from touching it."""
     scene = make_scene([Obstacle("circle", (40.0, -5.0), 4.0)], elbow="up")
     world = build_world(scene)
-    y = -3.0 + scene.margin_cm + 1e-6
+    y = -3.0 + scene.margin_cm + 1e-10
     assert prove_line(world, 38.0, y, 42.0, y)[0] == UNPROVED
-    assert prove_line(world, 38.0, y + 0.05, 42.0, y + 0.05)[0] == PROVED
+    for apart_cm in (1e-6, 0.05):
+        assert prove_line(world, 38.0, y + apart_cm, 42.0, y + apart_cm)[0] == PROVED
 
 
 def test_a_move_of_no_length_is_its_pose():

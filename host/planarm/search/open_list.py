@@ -14,6 +14,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from planarm_wire.kernel_cache import kernel
+
 Ints = NDArray[np.int64]
 Indices = NDArray[np.int32]
 
@@ -38,5 +40,22 @@ class OpenList(NamedTuple):
 
 def make_open_list(buckets: int, node: Indices, below: Indices) -> OpenList:
     """Return an empty list with at least so many buckets, its entries in the given arrays of equal size."""
-    ring = np.full(1 << (buckets + 1).bit_length(), NONE, np.int32)
-    return OpenList(node, below, ring, np.zeros(4, np.int64))
+    return OpenList(node, below, np.full(buckets_for(buckets), NONE, np.int32), np.zeros(4, np.int64))
+
+
+@kernel
+def buckets_for(least: int) -> int:
+    """Return the size of a ring with at least so many buckets: a power of two."""
+    size = 2
+    while size <= least + 1:
+        size *= 2
+    return size
+
+
+@kernel
+def twice_as_long(entries: Indices) -> Indices:
+    """Return entries with room for as many more; those there are copied."""
+    longer = np.empty(2 * entries.size, np.int32)
+    for i in range(entries.size):
+        longer[i] = entries[i]
+    return longer

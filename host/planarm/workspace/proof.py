@@ -14,7 +14,8 @@ With theta1 = phi +- beta(r), cos beta = (r^2 + l1^2 - l2^2) / (2 r l1), beta ha
 or at r* = sqrt(l1^2 - l2^2), where link 2 stands at a right angle to the tip's direction. So theta1 changes by at most
 dtheta1 = asin(rho / r_c) + max |beta(r) - beta(r_c)|, and the elbow moves at most 2 l1 sin(dtheta1 / 2).
 
-A line or curve is proved free by covering it with discs, found by bisection.
+A line or curve is proved free by covering it with discs, found by bisection. On a straight line an obstacle for which a
+disc is too wide may still be shown to stay clear by what is known of the motion (`planarm.workspace.straight_piece`).
 """
 
 from math import acos, asin, hypot, pi, sin, sqrt
@@ -24,6 +25,7 @@ from numpy.typing import NDArray
 
 from planarm.model.collision import point_segment_distance2, segment_polygon_distance
 from planarm.model.kinematics import ROUNDING_CM
+from planarm.workspace.straight_piece import link1_stays_clear, link2_stays_clear, turning_bounds
 from planarm.workspace.world import (
     FREE,
     ArmWorld,
@@ -36,7 +38,7 @@ from planarm.workspace.world import (
     theta1_at,
     within_limits,
 )
-from planarm_wire.kernel_cache import kernel
+from planarm_wire.kernel_cache import bare_kernel, kernel
 
 Floats = NDArray[np.float64]
 
@@ -45,6 +47,12 @@ PROVED, BLOCKED, UNPROVED = 0, 1, 2
 
 ALL = -1
 """Stands for the number of obstacles to look at."""
+
+FEW = 8
+"""So many obstacles are looked at for every disc of a line; of more, those that its first disc leaves."""
+
+ENDS_BELOW = 0.2
+"""Where a line takes pieces shorter than this share of it, its ends are looked at."""
 
 SMALLEST_CM = 1e-3
 """Radius of the smallest disc of a cover: what cannot be proved with it stays unproved."""
@@ -59,16 +67,28 @@ def displacement_bound(arm: TwoLinkArm, r_cm: float, rho_cm: float) -> float:
         r_cm: distance of the disc's centre from the base, within reach and limits.
         rho_cm: the disc's radius.
     """
-    l1, l2 = arm.l1_cm, arm.l2_cm
-    half, scale = 0.5 * (l1 * l1 + l2 * l2), 1.0 / (l1 * l2)
-    low, high = max(r_cm - rho_cm, 0.0), r_cm + rho_cm
-    cos_low, cos_high = (0.5 * low * low - half) * scale, (0.5 * high * high - half) * scale
+    half, scale = 0.5 * (arm.l1_cm * arm.l1_cm + arm.l2_cm * arm.l2_cm), 1.0 / (arm.l1_cm * arm.l2_cm)
     cos_here = (0.5 * r_cm * r_cm - half) * scale
-    sin2 = 1.0 - max(cos_low * cos_low, cos_high * cos_high)
+    sin2 = least_sin2(arm, r_cm, rho_cm)
     if 4.0 * sin2 >= 1.0 - cos_here * cos_here and sin2 > 0.0:
         return rho_cm / sqrt(sin2)
     turned = motion_bound(arm, r_cm, rho_cm)[1]
     return turned if sin2 <= 0.0 else min(turned, rho_cm / sqrt(sin2))
+
+
+@kernel
+def least_sin2(arm: TwoLinkArm, r_cm: float, rho_cm: float) -> float:
+    """Return the least sin^2 theta2 on a disc whose centre is r from the base; not above 0 if it holds a singular pose.
+
+    Args:
+        arm: the arm.
+        r_cm: distance of the disc's centre from the base.
+        rho_cm: the disc's radius.
+    """
+    half, scale = 0.5 * (arm.l1_cm * arm.l1_cm + arm.l2_cm * arm.l2_cm), 1.0 / (arm.l1_cm * arm.l2_cm)
+    low, high = max(r_cm - rho_cm, 0.0), r_cm + rho_cm
+    cos_low, cos_high = (0.5 * low * low - half) * scale, (0.5 * high * high - half) * scale
+    return 1.0 - max(cos_low * cos_low, cos_high * cos_high)
 
 
 @kernel
@@ -109,10 +129,12 @@ def disc_verdict(world: ArmWorld, x_cm: float, y_cm: float, rho_cm: float) -> in
         x_cm - world.arm.base_x_cm,
         y_cm - world.arm.base_y_cm,
         rho_cm,
+        0.0,
+        0.0,
     )
 
 
-@kernel
+@bare_kernel
 def _verdict(
     arm: TwoLinkArm,
     centers_cm: Floats,
@@ -124,10 +146,13 @@ def _verdict(
     x: float,
     y: float,
     rho_cm: float,
+    ux: float,
+    uy: float,
 ) -> int:
     """`disc_verdict` for a disc around (x, y) from the base, with the obstacles' arrays one by one, which is faster.
 
-    Only the obstacles in the first `count` places of `near` are looked at; all when `count` is ALL.
+    Only the obstacles in the first `count` places of `near` are looked at; all when `count` is ALL. With a direction
+    (ux, uy) of length 1 the tip's way is the disc's diameter in it, and more can be proved.
     """
     bx, by, margin, per_l1, per_l2 = arm.base_x_cm, arm.base_y_cm, arm.margin_cm, arm.per_l1, arm.per_l2
     r2 = x * x + y * y
@@ -157,6 +182,8 @@ def _verdict(
             blocked, clear = apart <= margin, apart > margin + moves
         if blocked:
             return BLOCKED
+        if free and not clear and (ux != 0.0 or uy != 0.0):
+            clear = _stays_clear(arm, cx, cy, keep, ex, ey, x, y, ux, uy, r, rho_cm)
         free = free and clear
     if within_limits(arm, bx + ex, by + ey, moves):
         return PROVED if free else UNPROVED
@@ -164,7 +191,40 @@ def _verdict(
     return BLOCKED if theta1 < arm.theta1_min_rad or theta1 > arm.theta1_max_rad else UNPROVED
 
 
-@kernel
+@bare_kernel
+def _stays_clear(
+    arm: TwoLinkArm,
+    cx: float,
+    cy: float,
+    keep_cm: float,
+    ex: float,
+    ey: float,
+    x: float,
+    y: float,
+    ux: float,
+    uy: float,
+    r_cm: float,
+    half_cm: float,
+) -> bool:
+    """Tell whether both links are proved to keep off c while the tip is at most `half_cm` from (x, y) along (ux, uy).
+
+    All is seen from the base; (ex, ey) is the elbow for the tip at (x, y), r from the base.
+    """
+    l1, l2 = arm.l1_cm, arm.l2_cm
+    sin2 = least_sin2(arm, r_cm, half_cm)
+    if sin2 <= 0.0:
+        return False
+    least_cross, fx, fy = l1 * l2 * sqrt(sin2), x - ex, y - ey
+    cross = ex * fy - ey * fx
+    turns = (fx * ux + fy * uy) / cross, -(ex * ux + ey * uy) / cross
+    bounds1 = turning_bounds(l1, l2, least_cross, r_cm + half_cm)
+    if not link1_stays_clear(cx, cy, keep_cm, ex, ey, turns[0], bounds1, half_cm):
+        return False
+    bounds2 = turning_bounds(l2, l1, least_cross, r_cm + half_cm)
+    return link2_stays_clear(cx, cy, keep_cm, ex, ey, x, y, ux, uy, turns, bounds1, bounds2, half_cm)
+
+
+@bare_kernel
 def _near_obstacles(
     arm: TwoLinkArm, centers_cm: Floats, radii_cm: Floats, x: float, y: float, rho_cm: float, near: NDArray[np.int64]
 ) -> int:
@@ -227,15 +287,43 @@ def prove_line_by(world: ArmWorld, x0: float, y0: float, x1: float, y1: float, s
         x, y = x0 + share * dx, y0 + share * dy
         if region_at(arm, sqrt(x * x + y * y)) != FREE:
             return BLOCKED, share
-    start, width, near, count = 0.0, 1.0, first_vertex, ALL
+    near = np.empty(radii.size, np.int64) if radii.size > FEW else first_vertex
+    return _cover_line(arm, centers, radii, first_vertex, vertices, near, x0, y0, dx, dy, length, smallest_cm)
+
+
+@bare_kernel
+def _cover_line(
+    arm: TwoLinkArm,
+    centers_cm: Floats,
+    radii_cm: Floats,
+    first_vertex: NDArray[np.int64],
+    vertices_cm: Floats,
+    near: NDArray[np.int64],
+    x0: float,
+    y0: float,
+    dx: float,
+    dy: float,
+    length: float,
+    smallest_cm: float,
+) -> tuple[int, float]:
+    """Cover the line from (x0, y0), seen from the base, with discs, as `prove_line_by` does; `near` is memory."""
+    ux, uy = (dx / length, dy / length) if length > 0.0 else (0.0, 0.0)
+    start, width, count, ends_known = 0.0, 1.0, ALL, False
     while start < 1.0:
+        if width < ENDS_BELOW and not ends_known:
+            # An end that only touches can be in no proved piece: not one, however many are tried on the way to it.
+            for share in (1.0, 0.0):
+                x, y = x0 + share * dx, y0 + share * dy
+                verdict = _verdict(arm, centers_cm, radii_cm, first_vertex, vertices_cm, near, count, x, y, 0.0, ux, uy)
+                if verdict != PROVED:
+                    return verdict, share
+            ends_known = True
         middle = start + 0.5 * width
         rho = 0.5 * width * length
         x, y = x0 + middle * dx, y0 + middle * dy
-        verdict = _verdict(arm, centers, radii, first_vertex, vertices, near, count, x, y, rho)
-        if count == ALL and verdict == UNPROVED and radii.size > 1:
-            near = np.empty(radii.size, np.int64)
-            count = _near_obstacles(arm, centers, radii, x, y, rho, near)
+        verdict = _verdict(arm, centers_cm, radii_cm, first_vertex, vertices_cm, near, count, x, y, rho, ux, uy)
+        if count == ALL and verdict == UNPROVED and radii_cm.size > FEW:
+            count = _near_obstacles(arm, centers_cm, radii_cm, x, y, rho, near)
         if verdict == PROVED:
             start, width = next_piece(start, width)
         elif verdict == BLOCKED or rho <= smallest_cm:
