@@ -250,6 +250,20 @@ def test_baud_rates_within_tolerance_are_understood():
     assert uno.serial.framing_errors == 0
 
 
+@pytest.mark.parametrize("baud", [9600, 57_600, 115_200, 250_000, 1_000_000, 1_999_999])
+def test_what_is_not_sampled_would_have_been_heard_as_it_is(baud):
+    """Frames of nearly the line's rate are passed on as they are, and no others: sampled bit by bit, all 256 agree."""
+    serial = Uno.from_hex(DATA / "echo.hex", baud=baud).serial
+    every = np.arange(256)
+    cycles = CLOCK_HZ / baud
+    for bit_cycles in sorted({max(1, round(cycles * share)) for share in np.linspace(0.85, 1.15, 121)}):
+        errors = serial.framing_errors
+        heard, data = serial._sample(every, np.full(256, bit_cycles))
+        as_they_are = bool(heard.all()) and data.tolist() == every.tolist() and serial.framing_errors == errors
+        assert serial._hears_every_bit(bit_cycles, bit_cycles) == as_they_are, (baud, bit_cycles)
+    assert not serial._hears_every_bit(round(cycles), round(1.5 * cycles + 1))
+
+
 @pytest.mark.parametrize("baud", [0, 299, 2_000_001])
 def test_impossible_baud_rates_are_refused(echo, baud):
     with pytest.raises(UsageError, match=f"baud is {baud}; .* 300 to 2000000"):

@@ -14,6 +14,7 @@ from hypothesis import strategies as some
 from planarm_sim.cpu import layout as at
 from planarm_sim.cpu.bus import touch
 from planarm_sim.cpu.chip import Chip, FirstTouch, StopCause
+from planarm_sim.cpu.queues import FIRST_ENTRIES
 from planarm_sim.errors import DefectError, ImageError
 from sim_chip.avr_assembler import assemble
 
@@ -302,3 +303,40 @@ def test_queued_drives_and_frames_survive_a_reset():
 def test_a_kernel_for_kernels_alone_refuses_python():
     with pytest.raises(TypeError, match=r"planarm_sim\.cpu\.bus\.touch is for kernels; make it a @kernel"):
         touch(np.zeros(1, np.int64), 0)
+
+
+# PB0 toggles, and a new character goes out every 80 cycles: U2X (UCSR0A), TXEN (UCSR0B), then UDR0 again and again.
+CHATTY = """
+        sbi 0x04, 0
+        ldi r16, 2
+        sts 0xC0, r16
+        ldi r16, 8
+        sts 0xC1, r16
+loop:   sts 0xC6, r17
+        inc r17
+        sbi 0x03, 0
+        rjmp loop
+"""
+
+
+def test_logs_that_run_over_are_those_of_a_chip_that_is_asked_often_in_copies_too():
+    end, step = 500_000, 1600
+    whole, often = Chip(assemble(CHATTY)), Chip(assemble(CHATTY))
+    pieces = []
+    for cycle in range(step, end, step):
+        often.run_to(cycle)
+        pieces.append((often.drain_edges(), often.drain_tx()))
+    expected = [np.concatenate(parts) for parts in zip(*pieces, strict=True)]
+    assert min(map(len, expected)) > FIRST_ENTRIES, "both logs ran over"
+
+    def drained(chip):
+        return chip.drain_edges(), chip.drain_tx()
+
+    whole.run_to(often.cycle)
+    middle, twin = whole.snapshot(), whole.fork()
+    for chip in (whole, twin):
+        assert all(np.array_equal(got, wanted) for got, wanted in zip(drained(chip), expected, strict=True))
+        assert [len(log) for log in drained(chip)] == [0, 0]
+    whole.run_to(whole.cycle + end)
+    whole.restore(middle)
+    assert all(np.array_equal(got, wanted) for got, wanted in zip(drained(whole), expected, strict=True))

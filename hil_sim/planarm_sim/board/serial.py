@@ -172,12 +172,11 @@ class SerialPort:
         frames = self._chip.drain_tx()
         if len(frames) == 0:
             return False
-        ends = frames["cycle"]
-        self._log.extend(ends - FRAME_BITS * frames["bit_cycles"].astype(np.int64), ends, FROM_BOARD, frames["byte"])
+        ends, bit_cycles = frames["cycle"], frames["bit_cycles"]
+        self._log.extend(ends - FRAME_BITS * bit_cycles, ends, FROM_BOARD, frames["byte"])
         data = frames["byte"].astype(np.uint8)
-        cycles, per = self._bit_cycles
-        if np.any(frames["bit_cycles"].astype(np.int64) * per != cycles):
-            heard, data = self._sample(frames["byte"].astype(np.int64), frames["bit_cycles"])
+        if not self._hears_every_bit(int(bit_cycles.min()), int(bit_cycles.max())):
+            heard, data = self._sample(frames["byte"].astype(np.int64), bit_cycles)
             ends = ends[heard]
         if self.bridge is None:
             self._received += data.tobytes()
@@ -243,6 +242,15 @@ class SerialPort:
         """First cycle after the last byte written; exact, so that no rounding adds up over a burst."""
         cycles, per = self._bit_cycles
         return self._burst_start - (-self._burst_bytes * FRAME_BITS * cycles // per)
+
+    def _hears_every_bit(self, least: int, most: int) -> bool:
+        """Tell whether this end samples each of ten bits once, of a board whose bits last `least` to `most` cycles.
+
+        Bit n is sampled n + 1/2 host bits after the start, and lasts from n to n + 1 board bits. So a host bit must be
+        18/19 of a board's or longer (bit 9 is not bit 8 again) and shorter than 18/17 (bit 8 is not yet bit 9).
+        """
+        cycles, per = self._bit_cycles
+        return 18 * per * most <= 19 * cycles and 17 * cycles < 18 * per * least
 
     def _sample(self, data: NDArray[Any], board_bit_cycles: NDArray[Any]) -> tuple[NDArray[Any], NDArray[np.uint8]]:
         """Receive frames as a UART of another rate does, each from its start bit on; the line is high after it.

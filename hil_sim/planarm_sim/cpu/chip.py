@@ -19,6 +19,7 @@ from planarm_sim.cpu import registers as reg
 from planarm_sim.cpu.decode import FLASH_BYTES
 from planarm_sim.cpu.dispatch import run
 from planarm_sim.cpu.interrupts import note_raised
+from planarm_sim.cpu.logs import Logs
 from planarm_sim.cpu.program import Program
 from planarm_sim.cpu.service import stand_still
 from planarm_sim.cpu.values import (
@@ -55,7 +56,6 @@ __all__ = [
     "Watcher",
 ]
 
-_NO_EDGES, _NO_FRAMES = np.empty(0, dtype=EDGE_DTYPE), np.empty(0, dtype=TX_DTYPE)
 PINS: Final = 24
 SRAM_BYTES: Final = reg.SRAM_END - reg.SRAM_START
 BOOT_WORDS: Final = (256, 512, 1024, 2048)
@@ -102,6 +102,7 @@ class Chip(ChipViews):
         state[at.ADC_INPUT : at.ADC_INPUT + at.ADC_INPUTS] = NOT_DRIVEN
         nothing = np.empty(0, dtype=np.int64)
         self._state = queues.allocate(state, (nothing,) * len(queues.ALL))
+        self._logs = Logs()
         self._watcher: Watcher | None = None
         self.reset(ResetCause.POWER_ON)
 
@@ -137,7 +138,7 @@ class Chip(ChipViews):
         if cause in _STOPS:
             return _STOPS[cause]
         if cause == service.LOG_FULL:
-            self._state = queues.allocate(self._state, queues.contents(self._state))
+            self._logs.set_aside(self._state)
         elif cause == service.RESET_WANTED:
             self._reset_as_asked()
         else:
@@ -264,16 +265,7 @@ class Chip(ChipViews):
 
     def drain_tx(self) -> NDArray[Any]:
         """Return and forget the frames that ended on TXD, TX_DTYPE in order of time."""
-        st = self._state
-        count, base = int(st[at.TX_COUNT]), int(st[at.TX_BASE])
-        if count == 0:
-            return _NO_FRAMES
-        raw = st[base : base + count * at.TX_WIDTH].reshape(count, at.TX_WIDTH)
-        result = np.empty(count, dtype=TX_DTYPE)
-        for column, name in enumerate(("cycle", "byte", "bit_cycles")):
-            result[name] = raw[:, column]
-        st[at.TX_COUNT] = 0
-        return result
+        return self._logs.take_frames(self._state)
 
     # --- Pins ------------------------------------------------------------------------------------------------
 
@@ -282,17 +274,7 @@ class Chip(ChipViews):
 
         The bits of a frame on TXD are not among them; `drain_tx` tells them all by cycle and bit time.
         """
-        st = self._state
-        count, base = int(st[at.EDGE_COUNT]), int(st[at.EDGE_BASE])
-        if count == 0:
-            return _NO_EDGES
-        raw = st[base : base + count]
-        result = np.empty(count, dtype=EDGE_DTYPE)
-        result["cycle"] = raw >> 8
-        result["pin"] = (raw >> 1) & 0x7F
-        result["level"] = raw & 1
-        st[at.EDGE_COUNT] = 0
-        return result
+        return self._logs.take_edges(self._state)
 
     def drive_pin(self, pin: int, level: int | None, cycle: int | None = None) -> None:
         """Drive a pin from outside at `cycle` (None: now); `level` None lets go of it.
@@ -344,12 +326,13 @@ class Chip(ChipViews):
 
     def snapshot(self) -> Snapshot:
         """Copy everything that decides the further run, logs not yet drained included."""
-        st = self._state
+        st = self._state = self._logs.put_back(self._state)
         entries = queues.contents(st) if queues.in_use(st) else ()
         return Snapshot(st[: at.STATE_WORDS].copy(), self._memory.copy(), self._program, entries)
 
     def restore(self, snapshot: Snapshot) -> None:
         """Go back to `snapshot`, of this chip or of another with any program; the same run follows."""
+        self._logs.forget()
         self._state = queues.refill(self._state, snapshot.state, snapshot.queues)
         self._memory[:] = snapshot.memory
         self._program = snapshot.program
@@ -359,6 +342,7 @@ class Chip(ChipViews):
     def fork(self) -> Chip:
         """Make a chip that goes on from here on its own; nothing watches it."""
         twin = copy.copy(self)
+        self._state, twin._logs = self._logs.put_back(self._state), Logs()
         twin._state, twin._memory = self._state.copy(), self._memory.copy()
         twin._words = twin._memory.view(np.int64)
         twin._sram, twin._eeprom = twin._memory[:SRAM_BYTES], twin._memory[SRAM_BYTES:]

@@ -1,7 +1,7 @@
 """The four queues behind the state array: frames sent, edges, frames to receive, outside drives.
 
-Kernels take entries out of the last two and append to the first two. When one of these is nearly full the CPU
-loop ends, Python moves everything into a larger array and goes on, so that no event is ever lost.
+Kernels take entries out of the last two and append to the first two, the logs. When one of these is nearly full the
+CPU loop ends, and what they hold is set aside (see `logs`). The others grow as they are filled, from outside.
 """
 
 from __future__ import annotations
