@@ -70,6 +70,7 @@ ALLOWED: dict[str, set[str]] = {
         "planarm.model",
         "planarm.workspace",
         "planarm.smoothing",
+        "planarm.dynamics",
         "planarm.trajectory",
         *WIRE,
     },

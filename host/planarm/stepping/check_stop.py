@@ -1,7 +1,8 @@
 """Certificate: the arm can come to rest on the path from anywhere, within the segments that the device holds.
 
 The allowances that travel with the plan are held against slowings found from the planned angles alone, by differences,
-and against stops integrated in continuous time; the device, which changes the clock from slice to slice, takes longer.
+and against stops integrated in continuous time; the device, which changes the clock from slice to slice, takes longer. What
+the motors' torque allows is found from the certificate's own torques, at rates of the clock down to a quarter.
 """
 
 from itertools import pairwise
@@ -13,6 +14,7 @@ from planarm.model.transmission import Transmission, motor_axes
 from planarm.scene import Scene
 from planarm.stepping.certificate import Check, Verdict, at_least, at_most
 from planarm.stepping.check_motion import Planned
+from planarm.stepping.check_torque import STRIDE, at_motors_nm, joint_torques_nm, pull_outs_nm
 from planarm.stepping.plan import SegmentPlan
 from planarm.stepping.slowing import LINK_MARGIN_TICKS
 from planarm.stepping.table import SegmentTable, segment_bytes
@@ -22,6 +24,12 @@ from planarm_wire.messages import MAX_PAYLOAD_BYTES, QUEUE_BYTES, QUEUE_FRAME_BY
 
 ROUNDING = 0.02
 """Differences see accelerations a tenth of a millisecond wide, and the planner's at a point."""
+
+CLOCK_RATES = (1.0, 0.75, 0.5, 0.25)
+"""Rates of the clock at which torques are looked at."""
+
+SLOWEST_RAD_S = 1e-9
+"""Friction that does not depend on speed has a sense at any speed but none."""
 
 MOST_RATE_PER_S = 1000.0
 
@@ -35,8 +43,12 @@ def check_stop(plan: SegmentPlan, table: SegmentTable, planned: Planned, scene: 
         return checks
     starts = table.starts
     setting = "joints.max_acceleration_deg_s2"
+    by_torque, borders_s = _torque_changes(planned, scene), starts / TICKS_HZ
     for name, column, sign in (("slowing", 0, 1.0), ("speeding up", 1, -1.0)):
-        largest = _least_in(_largest_changes(planned, scene, sign), planned.t_s[1:-1], starts / TICKS_HZ)
+        largest = np.minimum(
+            _least_in(_largest_changes(planned, scene, sign), planned.t_s[1:-1], borders_s),
+            _least_in(by_torque[column], planned.t_s[1:-1:STRIDE], borders_s),
+        )
         beyond = told[:, column] / np.maximum(largest, 1e-9)
         k = int(np.argmax(beyond))
         where = f"segment {k}, {_time(starts[k])}"
@@ -44,7 +56,7 @@ def check_stop(plan: SegmentPlan, table: SegmentTable, planned: Planned, scene: 
         checks.append(at_most(told_of, beyond[k], 1.0 + ROUNDING, "", where, setting))
     needs_s = told[:, 2] / TICKS_HZ
     at, owner = _slices(table)
-    beyond_s = _stops_s(planned, scene, at / TICKS_HZ) - needs_s[owner]
+    beyond_s = _stops_s(planned, scene, at / TICKS_HZ, by_torque[0]) - needs_s[owner]
     k = int(np.argmax(beyond_s))
     where = f"segment {owner[k]}, {_time(int(at[k]))}"
     slice_s = SLICE_TICKS / TICKS_HZ
@@ -112,6 +124,35 @@ def _largest_changes(planned: Planned, scene: Scene, sign: float) -> Floats:
     return most
 
 
+def _torque_changes(planned: Planned, scene: Scene) -> Floats:
+    """Return the largest slowing and speeding up of the path clock by the torque, every STRIDE times, shape (2, n).
+
+    At the rate u of the clock speeds are u times the planned ones and torques of motion u^2 times, and its change asks
+    for what accelerations as large as the speeds would.
+    """
+    speeds = (0.5 * (planned.speeds_rad_s[1:] + planned.speeds_rad_s[:-1]))[::STRIDE]
+    accelerations, q_rad = planned.accelerations_rad_s2[::STRIDE], planned.q_rad[1:-1:STRIDE]
+    lengths, still = scene.arm.link_lengths_cm, np.zeros_like(speeds)
+
+    def joints_nm(speeds: Floats, accelerations: Floats) -> Floats:
+        return joint_torques_nm(lengths, scene.mechanics, q_rad, speeds, accelerations)
+
+    held = joints_nm(still, still) if scene.mechanics.gravity else still
+    moving = joints_nm(speeds, accelerations) - held
+    per_change = at_motors_nm(scene, joints_nm(still, speeds) - held, still, speeds)
+    most = np.full((2, len(speeds)), MOST_RATE_PER_S)
+    resting = at_motors_nm(scene, held, np.sign(speeds) * SLOWEST_RAD_S, still)
+    viscous = at_motors_nm(scene, held, speeds, still) - resting
+    inertial = at_motors_nm(scene, moving, still, accelerations)
+    for u in CLOCK_RATES:
+        torques = resting + u * viscous + u * u * inertial
+        given = scene.motion.torque_share * pull_outs_nm(scene, u * speeds)
+        for row, sense in enumerate((-np.sign(per_change), np.sign(per_change))):
+            room = np.maximum(0.0, given - sense * torques) / np.maximum(np.abs(per_change), 1e-12)
+            most[row] = np.minimum(most[row], room.min(axis=1))
+    return most
+
+
 def _least_in(values: Floats, t_s: Floats, borders_s: Floats) -> Floats:
     """Return the least value in each segment, infinity where it has none.
 
@@ -124,7 +165,7 @@ def _least_in(values: Floats, t_s: Floats, borders_s: Floats) -> Floats:
     return np.array([values[a:b].min() if a < b else np.inf for a, b in ranges])
 
 
-def _stops_s(planned: Planned, scene: Scene, starts_s: Floats) -> Floats:
+def _stops_s(planned: Planned, scene: Scene, starts_s: Floats, by_torque: Floats) -> Floats:
     """Return the path time of a stop from each start with all of the slowing there is."""
     speeds = 0.5 * (planned.speeds_rad_s[1:] + planned.speeds_rad_s[:-1])
     over = np.zeros(len(speeds))
@@ -132,7 +173,8 @@ def _stops_s(planned: Planned, scene: Scene, starts_s: Floats) -> Floats:
     for motor, axis in enumerate(motor_axes(scene.joints, scene.coupling)):
         over = np.maximum(over, rates[:, motor] / np.sqrt(2.0 * axis.max_acceleration_rad_s2 * axis.usteps_per_rad))
     first: Ticks = np.searchsorted(planned.t_s[1:-1], starts_s)
-    return integrate_stops(_largest_changes(planned, scene, 1.0), over, first, float(planned.t_s[1]))
+    most = np.interp(planned.t_s[1:-1], planned.t_s[1:-1:STRIDE], by_torque)
+    return integrate_stops(np.minimum(_largest_changes(planned, scene, 1.0), most), over, first, float(planned.t_s[1]))
 
 
 @kernel

@@ -79,21 +79,35 @@ def joint_torques_nm(
 
 def motor_torque_shares(scene: Scene, joints_nm: Floats, qd_rad_s: Floats, qdd_rad_s2: Floats) -> Floats:
     """Return the share of its pull-out torque that each motor gives, shape (n, motors)."""
+    torques = at_motors_nm(scene, joints_nm, qd_rad_s, qdd_rad_s2)
+    return np.asarray(np.abs(torques) / pull_outs_nm(scene, qd_rad_s))
+
+
+def at_motors_nm(scene: Scene, joints_nm: Floats, qd_rad_s: Floats, qdd_rad_s2: Floats) -> Floats:
+    """Return the torque at each motor's own shaft, friction and rotor included, in N m, shape (n, motors)."""
     mechanics, coupling = scene.mechanics, np.array(scene.coupling)
     friction = np.array(mechanics.coulomb_friction_nm) * np.sign(qd_rad_s)
     friction = friction + np.array(mechanics.viscous_friction_nm_s) * qd_rad_s
     # Virtual work: motors that turn by C dq share the joints' torques as C^T tau_motors = tau_joints.
     behind_gears = np.linalg.solve(coupling.T, (joints_nm + friction).T).T
-    speeds, accelerations = qd_rad_s @ coupling.T, qdd_rad_s2 @ coupling.T
-    shares = np.empty_like(behind_gears)
+    accelerations = qdd_rad_s2 @ coupling.T
+    torques = np.empty_like(behind_gears)
     for m, joint in enumerate(scene.joints):
-        motor, gear = joint.motor, joint.gear_ratio
-        at_motor = behind_gears[:, m] / gear + motor.rotor_inertia_kg_m2 * gear * accelerations[:, m]
-        full_steps_s = np.abs(speeds[:, m]) * gear * joint.steps_per_rev / (2.0 * np.pi)
+        rotor = joint.motor.rotor_inertia_kg_m2 * joint.gear_ratio
+        torques[:, m] = behind_gears[:, m] / joint.gear_ratio + rotor * accelerations[:, m]
+    return torques
+
+
+def pull_outs_nm(scene: Scene, qd_rad_s: Floats) -> Floats:
+    """Return the pull-out torque that each motor has at its own shaft at these joint speeds, shape (n, motors)."""
+    speeds = np.abs(qd_rad_s @ np.array(scene.coupling).T)
+    given = np.empty_like(speeds)
+    for m, joint in enumerate(scene.joints):
+        motor = joint.motor
+        full_steps_s = speeds[:, m] * joint.gear_ratio * joint.steps_per_rev / (2.0 * np.pi)
         corner = motor.supply_v / (2.0 * motor.inductance_h * motor.current_a)
-        given = motor.peak_torque_nm * np.minimum(1.0, corner / np.maximum(full_steps_s, corner))
-        shares[:, m] = np.abs(at_motor) / given
-    return shares
+        given[:, m] = motor.peak_torque_nm * np.minimum(1.0, corner / np.maximum(full_steps_s, corner))
+    return given
 
 
 def _cross(a: Floats, b: Floats) -> Floats:

@@ -5,6 +5,8 @@ acceleration q'' u^2 + q' du/dt, with q' and q'' as planned, so it keeps its acc
 
     -du/dt <= slow = min over joints of (a - max(0, -q'' sgn q')) / |q'|,    du/dt <= fast, the same with +q''.
 
+The motors keep their torque besides, as far as the plan may use it (`planarm.trajectory.stretch`).
+
 The device changes the clock from slice to slice of a segment: with the stretch s = 1 / u, a slice of duration D that
 starts at s0 ends at s1 = s0 + slow D s0^3, at most 2 s0 (docs/protocol.md). Once all motors are below their start-stop
 speeds it stops. `need` follows that rule, slice by slice, so it is what the device takes.
@@ -15,12 +17,14 @@ from typing import NamedTuple, Self
 
 import numpy as np
 
+from planarm.dynamics.motor_terms import Load
 from planarm.model.transmission import Transmission, motor_axes
 from planarm.scene import Scene
 from planarm.stepping.plan import Allowance
 from planarm.stepping.train import Floats, Ticks
 from planarm.stepping.windows import start_stop_ticks
 from planarm.trajectory.motion import Trajectory
+from planarm.trajectory.stretch import torque_changes
 from planarm_wire.kernel_cache import kernel
 from planarm_wire.messages import (
     MAX_PAYLOAD_BYTES,
@@ -79,12 +83,14 @@ def allowances(trajectory: Trajectory, scene: Scene, durations_ticks: Sequence[i
     slices = Slices.of(durations_ticks)
     starts_s = np.append(slices.starts, slices.starts[-1] + slices.durations[-1]) / TICKS_HZ
     t_s = _times(trajectory, starts_s)
-    _, speeds, accelerations = trajectory.sample(t_s)
+    q, speeds, accelerations = trajectory.sample(t_s)
     limits = np.array([joint.max_acceleration_rad_s2 for joint in scene.joints])
     of_segment = slices.segment[np.searchsorted(starts_s[1:-1], t_s, side="right")]
     first = np.searchsorted(of_segment, np.arange(len(durations_ticks)))
+    by_torque = torque_changes(Load.of(scene, scene.motion.torque_share), q, speeds, accelerations)
     slow, fast = (
-        np.minimum.reduceat(_largest_change(speeds, sign * accelerations, limits), first) for sign in (1.0, -1.0)
+        np.minimum.reduceat(np.minimum(_largest_change(speeds, sign * accelerations, limits), torque), first)
+        for sign, torque in zip((1.0, -1.0), by_torque, strict=True)
     )
     needs = path_time_to_rest(
         slices.durations / TICKS_HZ,
