@@ -1,8 +1,8 @@
 """Certificate: the arm can come to rest on the path from anywhere, within the segments that the device holds.
 
 The allowances that travel with the plan are held against slowings found from the planned angles alone, by differences,
-and against stops integrated in continuous time; the device, which changes the clock from slice to slice, takes longer. What
-the motors' torque allows is found from the certificate's own torques, at rates of the clock down to a quarter.
+and against stops integrated in continuous time; the device, which changes the clock from slice to slice, takes longer.
+What the motors' torque allows is found from the certificate's own torques, at rates of the clock down to a quarter.
 """
 
 from itertools import pairwise

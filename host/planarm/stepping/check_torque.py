@@ -100,8 +100,8 @@ def at_motors_nm(scene: Scene, joints_nm: Floats, qd_rad_s: Floats, qdd_rad_s2: 
 
 def pull_outs_nm(scene: Scene, qd_rad_s: Floats) -> Floats:
     """Return the pull-out torque that each motor has at its own shaft at these joint speeds, shape (n, motors)."""
-    speeds = np.abs(qd_rad_s @ np.array(scene.coupling).T)
-    given = np.empty_like(speeds)
+    speeds: Floats = np.abs(qd_rad_s @ np.array(scene.coupling).T)
+    given: Floats = np.empty_like(speeds)
     for m, joint in enumerate(scene.joints):
         motor = joint.motor
         full_steps_s = speeds[:, m] * joint.gear_ratio * joint.steps_per_rev / (2.0 * np.pi)
