@@ -12,7 +12,7 @@ from link_model import USB_FLUSH_S, Damage, ModelLine, motion
 from planarm.errors import CertificateError, DeviceFault, LinkError, StepsDifferError
 from planarm.link.clock_sync import Span
 from planarm.link.exchange import open_session, request, stream_plan
-from planarm.link.margin import Margin, line_margin
+from planarm.link.margin import SeenLine, line_margin
 from planarm.link.plan_steps import planned_usteps
 from planarm.link.position import Certainty, StreamError, StreamFault
 from planarm.link.remaining import Remaining, words_of
@@ -471,8 +471,8 @@ def test_a_line_too_slow_for_the_plan_slows_the_motion_and_says_so_before_it_sta
 
     result = stream_plan(line, plan, warn=warn)
     assert re.fullmatch(
-        r"the line was seen to carry \d+ bytes/s, the plan asks for \d+ and some to spare: the motion runs at"
-        r" \d+ % of its speed and takes \d+\.\d s instead of 1\.2 s",
+        r"the line was seen to carry \d+ bytes/s and to answer after \d+\.\d ms, the plan asks for \d+ bytes/s and some"
+        r" to spare: the motion runs at \d+ % of its speed and takes \d+\.\d s instead of 1\.2 s",
         said[0],
     )
     assert len(said) == 1
@@ -489,17 +489,24 @@ def test_a_good_line_changes_nothing_and_takes_an_earlier_override_back():
 
 
 def test_what_a_plan_asks_of_the_line_is_what_has_to_arrive_in_time():
-    plan = motion(300, ticks=64_000)
+    plan, seen = motion(300, ticks=64_000), SeenLine.of(1000, 0.1, 0.002)
     result = stream_plan(ModelLine(), plan)
-    whole = line_margin(plan, 40, 1000, 0.1)
-    assert whole.seen == pytest.approx(10_000.0)
-    assert whole.asked < result.bytes_sent / result.motion_s, "what the queue holds need not be sent in time"
-    busy = line_margin((*motion(100, ticks=320_000)[:-1], *motion(300, ticks=20_000)), 40, 1000, 0.1)
-    assert busy.asked > line_margin(motion(400, ticks=320_000), 40, 1000, 0.1).asked
-    assert line_margin(plan, 300, 1000, 0.1).percent == 100, "all of it is in the queue"
-    assert line_margin(plan, 40, 299, 10.0).percent == 100, "too little was seen"
-    assert Margin(1000.0, 500.0, 1.0).percent == 45
-    assert Margin(1e9, 500.0, 1.0).percent == 1
+    whole = line_margin(plan, 40, seen)
+    assert whole.seen.bytes_s == pytest.approx(10_000.0)
+    assert whole.asked_bytes_s < result.bytes_sent / result.motion_s, "what the queue holds need not be sent in time"
+    busy = line_margin((*motion(100, ticks=320_000)[:-1], *motion(300, ticks=20_000)), 40, seen)
+    assert busy.asked_bytes_s > line_margin(motion(400, ticks=320_000), 40, seen).asked_bytes_s
+    assert line_margin(plan, 300, seen).percent == 100, "all of it is in the queue"
+    assert line_margin(plan, 40, SeenLine.of(299, 10.0, 0.002)).percent == 100, "too little was seen"
+    assert line_margin(plan, 40, SeenLine.of(1000, 100.0, 0.002)).percent == 1
+    rates = [line_margin(plan, 40, SeenLine.of(1000, 1000.0 / r, 0.002)).percent for r in range(500, 10_000, 500)]
+    assert rates == sorted(rates)
+    assert 1 < rates[1] < rates[4] < 100
+    # What comes late asks for a slower motion, and so does a stop that takes more of the path that is held.
+    assert line_margin(plan, 40, SeenLine.of(1000, 0.1, 0.15)).percent < line_margin(plan, 40, seen).percent
+    long_stops = (Allowance(1e-6, 1e-6, 800_000.0),) * 300
+    slow = SeenLine.of(1000, 0.4, 0.002)
+    assert line_margin(plan, 40, slow, long_stops).percent < line_margin(plan, 40, slow).percent
 
 
 # -- the hand on a running stream -------------------------------------------------------------------------------------

@@ -70,3 +70,16 @@ def test_the_peak_of_the_line_leaves_room_for_lost_frames(segments_hz, verdict):
     check = next(check for check in checks_of(plan) if "peak" in check.name)
     assert check.verdict == verdict
     assert check.value == pytest.approx(12.5 * segments_hz / 25_000, rel=0.1)
+
+
+@pytest.mark.parametrize(("segments_hz", "verdict"), [(300, "green"), (1200, "red")])
+def test_the_bandwidth_margin_is_what_is_carried_by_what_is_asked(segments_hz, verdict):
+    """12.5 bytes a segment; the longer the motion, the less the full queue at its start helps."""
+    plan = plan_of(*[(16_000_000 // segments_hz, Move(3, 1000), REST)] * 20_000)
+    check = next(check for check in checks_of(plan) if "margin" in check.name)
+    assert check.verdict == verdict
+    assert check.value == pytest.approx(11_000 / (12.5 * segments_hz), rel=0.05)
+
+
+def test_what_fits_into_the_queue_asks_nothing_of_the_line():
+    assert not [check for check in checks_of(plan_of((10**6, Move(3, 1000), REST))) if "margin" in check.name]

@@ -66,6 +66,7 @@ class ArqCounters:
     repeated_acks: int = 0
     busy_replies: int = 0
     bytes_sent: int = 0  # copies and leading delimiters included
+    bytes_taken: int = 0  # of frames that were acknowledged, each counted once
 
 
 @dataclass(slots=True)
@@ -89,6 +90,8 @@ class GoBackN:
         self.resent: list[Resent] = []
         self.answered_s: float | None = None
         """When the newest acknowledged frame was first sent: every later reply was made after that."""
+        self.quickest_s = float("inf")
+        """Least time from a frame's first sending to its acknowledgement."""
         self._outstanding: deque[_Outstanding] = deque()
         self._smoothed_s: float | None = None
         self._least_s = 0.0
@@ -143,8 +146,10 @@ class GoBackN:
         for _ in range(advance):
             newest = self._outstanding.popleft()
             self.bytes_in_flight -= len(newest.frame)
+            self.counters.bytes_taken += len(newest.frame)
             self.room_in_flight -= newest.room
         self.answered_s = newest.first_sent_s
+        self.quickest_s = min(self.quickest_s, now_s - newest.first_sent_s)
         if newest.first:
             self._measure(now_s - newest.sent_s)
         self._timer_s = now_s
@@ -159,6 +164,11 @@ class GoBackN:
         return self._go_back(now_s, unanswered=True)
 
     @property
+    def _soonest_s(self) -> float:
+        """The least time in which an answer ever came; that of frames sent again, too, while there are no others."""
+        return self._least_s or (0.0 if self.quickest_s == float("inf") else self.quickest_s)
+
+    @property
     def _wait_s(self) -> float:
         return min(self._timeout_s * self._patience, MAX_TIMEOUT_S)
 
@@ -169,7 +179,7 @@ class GoBackN:
             self.counters.busy_replies += 1
             return b""
         self.counters.repeated_acks += 1
-        if now_s < self._deaf_until_s or now_s - self._outstanding[0].sent_s < self._least_s:
+        if now_s < self._deaf_until_s or now_s - self._outstanding[0].sent_s < self._soonest_s:
             return b""
         return self._go_back(now_s, unanswered=False)
 

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from planarm.errors import DeviceFault, LinkError
 from planarm.link.clock_sync import ClockReading, Span
 from planarm.link.knock import ask_expected
+from planarm.link.margin import Margin
 from planarm.link.position import Known, Meeting, PositionReport, StreamError, StreamFault, judge
 from planarm.link.session import Session, SessionLimits, fault_words
 from planarm.link.stream import PERCENT, Joining, Phase, Stream, StreamOptions, StreamProgress
@@ -49,6 +50,8 @@ class StreamResult:
     damaged_replies: int
     path_clock_percent: int
     """Rate of the path clock for the line's sake: 100 unless the line is too slow for the plan."""
+    margin: Margin | None
+    """What the plan asked of the line, and what it was seen to carry; None when all of it was queued before START."""
     least_queued: int
     """Fewest segments seen in the device's queue while more were to come."""
     cleared_fault: Fault
@@ -238,6 +241,7 @@ def _result(session: Session, now_s: float, began_s: float, stream: Stream | Non
         bytes_lost=session.line.overruns + session.line.ring_full,
         damaged_replies=session.line.damaged_replies,
         path_clock_percent=stream.path_clock_percent if stream else PERCENT,
+        margin=stream.margin if stream else None,
         least_queued=stream.least_queued if stream else 0,
         cleared_fault=stream.cleared_fault if stream else Fault.NONE,
         began_s=stream.began_s if stream else None,

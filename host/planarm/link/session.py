@@ -130,6 +130,11 @@ class Session:
         return self._arq.resent
 
     @property
+    def quickest_s(self) -> float:
+        """Least time from a frame's first sending to its acknowledgement; infinity before the first."""
+        return self._arq.quickest_s
+
+    @property
     def room_in_flight(self) -> int:
         """Bytes of the device's queue that frames sent and not acknowledged take."""
         return self._arq.room_in_flight

@@ -14,7 +14,7 @@ from itertools import accumulate
 
 from planarm.errors import CertificateError, LinkError, StepsDifferError
 from planarm.link.clock_sync import Span
-from planarm.link.margin import line_margin
+from planarm.link.margin import Margin, SeenLine, line_margin
 from planarm.link.packing import Packer
 from planarm.link.path_time import PathTime
 from planarm.link.plan_steps import PlanSteps
@@ -77,6 +77,7 @@ class Stream:
         self.stopped = False
         self.unasked_holds = 0
         self.path_clock_percent = PERCENT
+        self.margin: Margin | None = None
         self._warn = warn
         self._filling_since_s = 0.0
         self._filled_from_bytes = 0
@@ -227,7 +228,7 @@ class Stream:
         self._session.guarded = True
         self.ledger_before = self._status.ledger
         self._filling_since_s = now_s
-        self._filled_from_bytes = self._session.arq_counters.bytes_sent
+        self._filled_from_bytes = self._session.arq_counters.bytes_taken
         self.phase = Phase.FILLING
 
     def _fill(self, now_s: float) -> None:
@@ -241,9 +242,10 @@ class Stream:
     def _set_path_clock(self, now_s: float) -> None:
         """Let the path clock run as planned, or slower where the line was not seen to carry the plan."""
         if self.sent_segments < len(self._segments):
-            seen = self._session.arq_counters.bytes_sent - self._filled_from_bytes
-            margin = line_margin(self._segments, self.sent_segments, seen, now_s - self._filling_since_s)
-            self.path_clock_percent = margin.percent
+            seen = self._session.arq_counters.bytes_taken - self._filled_from_bytes
+            line = SeenLine.of(seen, now_s - self._filling_since_s, self._session.quickest_s)
+            margin = line_margin(self._segments, self.sent_segments, line, self._options.allowances)
+            self.margin, self.path_clock_percent = margin, margin.percent
             if margin.percent < PERCENT and self._warn is not None:
                 self._warn(str(margin))
         if self._status.override_percent != self.path_clock_percent:
@@ -324,6 +326,7 @@ class Stream:
                 wanted -= encoded_bytes(self._segments[until])
                 until += 1
         wait_s = (self._ends_ticks[until] - self._ends_ticks[self._executed]) / TICKS_HZ
+        wait_s *= PERCENT / max(1, min(self._status.rate_percent, self.path_clock_percent))
         return self._session.status_s + min(max(wait_s, MIN_POLL_S), MAX_POLL_S)
 
     # -- following the device -----------------------------------------------------------------------------------------

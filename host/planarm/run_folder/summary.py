@@ -35,11 +35,25 @@ def summarise(
         **planned_figures(plan),
         "bytes_sent": streamed.bytes_sent,
         "retransmissions": streamed.retransmissions,
+        **_line_figures(streamed),
         **_clock_figures(streamed),
         "net_usteps_by_ledger": list(by_ledger_usteps),
         "net_usteps": list(net_usteps),
         **tip_figures(plan, net_usteps),
         **seen_figures(findings, arm),
+    }
+
+
+def _line_figures(streamed: StreamResult) -> dict[str, float]:
+    """Return what the plan asked of the line and what that carried; nothing when all fitted into the queue."""
+    margin = streamed.margin
+    if margin is None or margin.seen.bytes_s is None:
+        return {}
+    return {
+        "line_asked_bytes_s": round(margin.asked_bytes_s, 1),
+        "line_seen_bytes_s": round(margin.seen.bytes_s, 1),
+        "line_bandwidth_margin": round(margin.seen.bytes_s / max(margin.asked_bytes_s, 1.0), 2),
+        "path_clock_percent": margin.percent,
     }
 
 

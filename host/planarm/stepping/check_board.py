@@ -8,6 +8,14 @@ from planarm.scene import LinkSpec
 from planarm.stepping.certificate import Check, at_least, at_most
 from planarm.stepping.table import SegmentTable, segment_bytes
 from planarm.stepping.train import Floats, StepTrain, Ticks
+from planarm_wire.board_budget import (
+    LATEST_READ_TICKS,
+    LEAST_SHARE,
+    LINE_LOAD,
+    READ_TICKS,
+    SLICE_WORK_TICKS,
+    STEP_INTERRUPT_TICKS,
+)
 from planarm_wire.messages import (
     CRC_BYTES,
     HEADER_BYTES,
@@ -21,17 +29,8 @@ from planarm_wire.messages import (
 BITS_PER_BYTE = 10
 """On the line: start bit, eight bits, stop bit."""
 
-STEP_INTERRUPT_TICKS = 79
-LINE_LOAD = 0.1
-READ_TICKS = 15_000
-SLICE_WORK_TICKS = 8_000
-LATEST_READ_TICKS = 20_000
-LEAST_SHARE = 0.05
 QUEUED_HEAD_BYTES = 4.0
-"""What the board takes, measured on the emulator (firmware/README.md, budgets): a step's interrupt; the share of the
-line's interrupts; the main program's work on a segment, from the rates at which it just keeps up (12,000 to 15,000),
-and on each further slice of it; how long before its start a segment must be there. LEAST_SHARE keeps an overloaded
-board's time finite; the last is a frame's head in the queue."""
+"""A frame's head in the queue."""
 
 LOAD_WINDOW_TICKS = 80_000
 MOST_LOAD = 0.75
@@ -52,7 +51,7 @@ def check_board(table: SegmentTable, made: StepTrain, link: LinkSpec) -> list[Ch
     """Check the interrupt load, the line's peak, and that segments come and are read in time."""
     if not len(table.durations):
         return []
-    return [_check_load(made), _check_peak(table, link), *_check_supply(table, link)]
+    return [_check_load(made), _check_peak(table, link), *_check_margin(table, link), *_check_supply(table, link)]
 
 
 def _check_load(made: StepTrain) -> Check:
@@ -77,15 +76,40 @@ def _frame_bytes(table: SegmentTable) -> Floats:
     return np.asarray(segment_bytes(table), np.float64) + _share_of_frame(table) * frame
 
 
-def _check_peak(table: SegmentTable, link: LinkSpec) -> Check:
-    """Check the largest share of the line in any LINE_WINDOW_S.
+def _carried_bytes_s(link: LinkSpec) -> float:
+    """Return what the line carries.
 
-    What can be sent is less than the line's rate: at most HOST_WINDOW_BYTES are on their way until a reply has come
-    back, and that takes their own time, the bridge's flush and the reply's time.
+    That is less than its rate: at most HOST_WINDOW_BYTES are on their way until a reply has come back, and that takes
+    their own time, the bridge's flush and the reply's time.
     """
+    turn_s = (HOST_WINDOW_BYTES + REPLY_BYTES) / (link.baud / BITS_PER_BYTE) + FLUSH_S
+    return HOST_WINDOW_BYTES / turn_s
+
+
+def _check_margin(table: SegmentTable, link: LinkSpec) -> list[Check]:
+    """Check how many times over the line carries what is asked of it up to any segment's start.
+
+    What the queue holds at the start is not asked; where it holds all, there is nothing to check. The line that a plan
+    meets is measured before it moves.
+    """
+    begun = _begun_before(table)
+    later = np.flatnonzero(begun >= 0)
+    name, setting = "bandwidth margin of the line", "link.baud or joints.microsteps"
+    if not len(later):
+        return []
+    first = int(later[0])
+    missing = np.cumsum(_frame_bytes(table)[first:])
+    asked_bytes_s = missing * TICKS_HZ / np.maximum(table.starts[first:-1], 1)
+    worst = int(asked_bytes_s.argmax())
+    margin = _carried_bytes_s(link) / float(asked_bytes_s[worst])
+    where = f"segment {first + worst}, {_time(int(table.starts[first + worst]))}"
+    return [at_least(name, margin, 1.0, "times", where, setting)]
+
+
+def _check_peak(table: SegmentTable, link: LinkSpec) -> Check:
+    """Check the largest share of the line in any LINE_WINDOW_S, against what it carries."""
     line_bytes_s = link.baud / BITS_PER_BYTE
-    turn_s = (HOST_WINDOW_BYTES + REPLY_BYTES) / line_bytes_s + FLUSH_S
-    budget = HOST_WINDOW_BYTES / turn_s / line_bytes_s
+    budget = _carried_bytes_s(link) / line_bytes_s
     starts, total = table.starts[:-1], np.concatenate([[0.0], np.cumsum(_frame_bytes(table))])
     until = np.searchsorted(starts, starts + int(LINE_WINDOW_S * TICKS_HZ), side="left")
     sent: Floats = total[until] - total[np.arange(len(starts))]
