@@ -62,6 +62,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def add_watch_options(parser: argparse.ArgumentParser) -> None:
     """Add what `watch_of` reads; the same options wherever boards are emulated."""
     parser.add_argument("--vcd", metavar="FILE", help="write the pins' waveforms")
+    parser.add_argument("--isr", action="store_true", help="with --vcd: also which interrupt runs; runs slower")
     parser.add_argument("--serial-log", metavar="FILE", help="write every byte on the serial line and its cycles")
     parser.add_argument(
         "--profile", metavar="FILE", help="write interrupts, load, stack and cycles per function (JSON); runs slower"
@@ -72,7 +73,7 @@ def add_watch_options(parser: argparse.ArgumentParser) -> None:
 
 def watch_of(options: argparse.Namespace) -> Watch:
     """What the options ask to be recorded."""
-    return Watch(options.vcd, options.serial_log, options.profile, options.symbols, options.gdb)
+    return Watch(options.vcd, options.serial_log, options.profile, options.symbols, options.isr, options.gdb)
 
 
 def summary(result: Emulation) -> str:

@@ -150,8 +150,8 @@ def run_board(
     say: Callable[[str], None],
 ) -> Emulation:
     """As `emulate`, with a board, a line, a clock and a way to stop it of the caller's."""
-    if watch.profile is not None:
-        uno.observe(symbols=watch.symbols, keep_intervals=False)
+    if watch.profile is not None or watch.interrupts:
+        uno.observe(symbols=watch.symbols, keep_intervals=watch.interrupts)
     machine = uno if bench is None else bench
     machine.run(cycles=1)  # compiles the chip, if nobody has: seconds that are nobody's lag
     start_cycle, start_s = uno.cycle, clock.now_s()

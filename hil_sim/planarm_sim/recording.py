@@ -7,12 +7,13 @@ from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
+from numpy.typing import NDArray
 
 from planarm_sim.board import PINS, Uno, pin_name
-from planarm_sim.errors import TraceError
+from planarm_sim.errors import TraceError, UsageError
 from planarm_sim.insight import Insight
 from planarm_sim.trace import SerialCsvWriter, VcdWriter
 
@@ -33,6 +34,7 @@ class Watch:
         serial_log: table of every byte on the serial line, CSV.
         profile: JSON file with the figures of `Insight`, written at the end.
         symbols: ELF file with the program's functions, for a program that came as Intel HEX.
+        interrupts: let the waveforms tell which interrupt runs (`isr`); the board runs at about a third of the speed.
         gdb_port: port at which avr-gdb may attach; 0 takes a free one.
     """
 
@@ -40,7 +42,17 @@ class Watch:
     serial_log: str | Path | None = None
     profile: str | Path | None = None
     symbols: str | Path | None = None
+    interrupts: bool = False
     gdb_port: int | None = None
+
+    def __post_init__(self) -> None:
+        """Refuse what asks for something that has no place.
+
+        Raises:
+            UsageError: interrupts without waveforms.
+        """
+        if self.interrupts and self.vcd is None:
+            raise UsageError("which interrupt runs (--isr) is told in the waveforms: give --vcd FILE as well")
 
 
 NO_WATCH = Watch()
@@ -58,10 +70,13 @@ class Sink:
         self._rising = np.zeros(256, dtype=np.int64)
         self._stack = ExitStack()
         self._vcd: VcdWriter | None = None
+        self._interrupts = watch.interrupts
+        self._held: list[NDArray[Any]] = []  # edges of which it is not yet settled which interrupt ran
         self._serial: SerialCsvWriter | None = None
         if watch.vcd is not None:
+            numbers = ("isr",) if watch.interrupts else ()
             levels = [uno.pin(name).level for name in TRACED_PINS]
-            self._vcd = self._stack.enter_context(VcdWriter(watch.vcd, TRACED_PINS, levels, uno.cycle))
+            self._vcd = self._stack.enter_context(VcdWriter(watch.vcd, TRACED_PINS, levels, uno.cycle, numbers))
         if watch.serial_log is not None:
             self._serial = self._stack.enter_context(SerialCsvWriter(watch.serial_log))
 
@@ -72,11 +87,20 @@ class Sink:
         else:
             self._uno.serial.clear_log()
         edges = self._uno.take_edges()
-        if len(edges) == 0:
-            return
-        self._rising += np.bincount(edges["pin"][edges["level"] == 1], minlength=256)
-        if self._vcd is not None:
+        if len(edges):
+            self._rising += np.bincount(edges["pin"][edges["level"] == 1], minlength=256)
+        if self._vcd is not None and self._interrupts:
+            self._write_with_interrupts(self._vcd, edges)
+        elif self._vcd is not None and len(edges):
             self._vcd.write(edges, _SIGNAL_OF)
+
+    def _write_with_interrupts(self, vcd: VcdWriter, edges: NDArray[Any]) -> None:
+        """Write what is settled; the rest waits for the interrupt under way to return."""
+        changes, settled = self._uno.take_running_interrupts()
+        joined = np.concatenate([*self._held, edges])
+        until = int(np.searchsorted(joined["cycle"], settled))
+        vcd.write(joined[:until], _SIGNAL_OF, changes)
+        self._held = [joined[until:]]
 
     def rising_edges(self) -> dict[str, int]:
         """Rising edges of each pin that had any, by board name."""
@@ -91,6 +115,8 @@ class Sink:
     ) -> None:
         self.take()
         if self._vcd is not None:
+            for edges in self._held:
+                self._vcd.write(edges, _SIGNAL_OF)
             self._vcd.close(self._uno.cycle)
         self._stack.close()
 

@@ -39,7 +39,7 @@ def test_an_unknown_scheme_names_the_known_ones():
 
 
 @pytest.mark.parametrize(
-    "url", ["sim://here", "sim:///x.hex", "sim://?hex=a", "sim://?image=a&speed=2", "sim://?usb=8u2"]
+    "url", ["sim://here", "sim:///x.hex", "sim://?hex=a", "sim://?image=a&speed=2", "sim://?usb=8u2", "sim://?isr=2"]
 )
 def test_the_emulator_takes_an_image_and_a_bridge_and_nothing_else(url):
     with pytest.raises(LinkError, match=r"takes sim://, sim://\?image=PATH, sim://\?usb=16u2"):
@@ -135,6 +135,18 @@ def test_the_wheel_comes_before_the_checkout(tmp_path, monkeypatch):
     assert images.released_image() == checkout
     wheel.write_text("")
     assert images.released_image() == wheel
+
+
+def test_the_emulators_waveforms_tell_which_interrupt_runs_when_asked_to(tmp_path):
+    """USART_RX is vector 18 (datasheet, table 12-6: 19, counted from RESET as 1)."""
+    for query, asked in (("", False), ("?isr=1", True)):
+        with contextlib.closing(open_transport(f"sim://{query}")) as line:
+            line.clock.wait_until(0.02)
+            line.write(encode_frame(0, *encode(messages.Hello(messages.PROTOCOL_VERSION, host_nonce=7))))
+            line.read(100, 1.0)
+            line.pins.write_vcd(tmp_path / "pins.vcd")
+        text = (tmp_path / "pins.vcd").read_text()
+        assert (" isr $end" in text, "\nb10010 " in text) == (asked, asked)
 
 
 def test_the_emulators_bridge_passes_a_session_on():

@@ -10,10 +10,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from planarm_sim import Uno
+from planarm_sim.emulate import TRACED_PINS, Stop, Watch, run_board
 from planarm_sim.errors import UsageError
 from planarm_sim.insight import INTERVAL, Spread
 from planarm_sim.insight.figures import running_interrupts
 from planarm_sim.loader import Image, Symbol, load_elf
+from sim_board.fake_line import FakeClock, FakeLine
 from sim_chip.avr_assembler import assemble
 
 DATA = Path(__file__).parent / "data"
@@ -224,6 +226,30 @@ def test_a_restored_board_is_watched_anew():
     uno.restore(kept)
     uno.run(cycles=5_000)
     assert (uno.insight(), uno.interrupt_intervals().tolist()) == first
+
+
+@pytest.mark.parametrize("slice_s", [0.000_013, 0.000_25, 0.002])
+def test_waveforms_with_interrupts_written_piece_by_piece_are_those_written_at_once(tmp_path, slice_s, monkeypatch):
+    """Interrupts within an interrupt, edges within both, and slices that end in the midst of them."""
+    monkeypatch.setattr("planarm_sim.bridge.bridge.QUIET_SLICE_S", slice_s)
+    nested = TIMER.replace("isr:\n", "isr:\nsei\nnop\n").replace("0xE7", "0x20").replace("ldi r16, 3", "ldi r16, 0")
+    pieces, whole = (board(nested.format(loop="loop: rjmp loop")) for _ in range(2))
+    clock = FakeClock()
+    watch = Watch(vcd=tmp_path / "pieces.vcd", interrupts=True)
+    run_board(pieces, FakeLine(clock, []), clock, Stop(), watch=watch, seconds=0.01, say=print)
+    whole.observe()
+    whole.run(cycles=1)
+    whole.clear_edges()
+    whole.run(cycles=pieces.cycle - whole.cycle)
+    whole.write_vcd(tmp_path / "whole.vcd", TRACED_PINS)
+    text = (tmp_path / "pieces.vcd").read_text()
+    assert text == (tmp_path / "whole.vcd").read_text()
+    assert text.count("b1011 ") > 1000, "TIMER1_COMPA, vector 11"
+
+
+def test_interrupts_have_no_place_without_waveforms():
+    with pytest.raises(UsageError, match="give --vcd FILE as well"):
+        Watch(interrupts=True)
 
 
 def test_it_must_be_asked_for_before():

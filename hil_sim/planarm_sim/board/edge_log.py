@@ -71,15 +71,9 @@ class EdgeLog:
         signal_of = {pin_place(name).index: number for number, name in enumerate(names)}
         start = dict(zip(PINS, self._start_levels, strict=True))
         levels = [start[pin_place(name)] for name in names]
-        edges, done = self._recorded(), 0
         numbers = () if interrupts is None else ("isr",)
         with VcdWriter(path, names, levels, self.start_cycle, numbers) as vcd:
-            for cycle, vector in interrupts or ():
-                until = int(np.searchsorted(edges["cycle"], cycle, side="right"))
-                vcd.write(edges[done:until], signal_of)
-                vcd.number(cycle, 0, vector)
-                done = until
-            vcd.write(edges[done:], signal_of)
+            vcd.write(self._recorded(), signal_of, interrupts or ())
             vcd.close(self._chip.cycle)
 
     def snapshot(self) -> EdgeLogState:

@@ -340,6 +340,18 @@ class Uno:
         """
         return self._watching().intervals()
 
+    def take_running_interrupts(self) -> tuple[list[tuple[int, int]], int]:
+        """Return which interrupts ran since the last call, and forget their intervals; for runs without end.
+
+        Returns:
+            The cycles at which another one, or none (0), began to run, with its number, as far as that is settled; and
+            the cycle up to which it is: now, or when the interrupt that has not yet returned began.
+
+        Raises:
+            UsageError: the program is not watched.
+        """
+        return self._watching().take_running(self.cycle)
+
     def debug_target(self) -> Target:
         """The board as a debugger sees it; see `planarm_sim.debug`."""
         from planarm_sim.debug import Target  # noqa: PLC0415 - a start need not wait for it

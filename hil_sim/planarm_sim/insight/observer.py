@@ -21,6 +21,7 @@ from planarm_sim.insight.figures import (
     Insight,
     InterruptFigures,
     Spread,
+    running_interrupts,
 )
 from planarm_sim.insight.roles import landmarks, roles_for_insight, with_breakpoints
 from planarm_sim.loader import Symbol
@@ -128,6 +129,19 @@ class Observer:
         joined = np.concatenate([_NOTHING, *self._intervals])
         self._intervals = [joined]
         return joined[np.argsort(joined["entry"], kind="stable")]
+
+    def take_running(self, cycle: int) -> tuple[list[tuple[int, int]], int]:
+        """Return and forget which interrupts ran, as far as that is settled, and up to which cycle it is.
+
+        What began in or after an interrupt that has not returned is kept for later.
+        """
+        frames = self._frames.reshape(k.FRAMES, k.FRAME_WORDS)[: int(self._totals[k.DEPTH])]
+        under_way = frames[frames[:, k.FRAME_VECTOR] != 0, k.FRAME_BEGAN]
+        settled = int(min(cycle, under_way.min(initial=cycle)))
+        intervals = self.intervals()
+        over = intervals["entry"] < settled
+        self._intervals = [intervals[~over]]
+        return running_interrupts(intervals[over]), settled
 
     def insight(self, cycle: int) -> Insight:
         """The figures up to `cycle`; functions that have not returned count up to there."""

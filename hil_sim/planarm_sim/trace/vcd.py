@@ -8,7 +8,7 @@ PulseView (sigrok) set the import option "downsample" to 625, which gives one sa
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
@@ -108,16 +108,26 @@ class VcdWriter:
             self._advance(cycle)
         self._file.write(f"b{value:b} {self._codes[self._first_number + number]}\n")
 
-    def write(self, edges: NDArray[Any], signal_of: Mapping[int, int]) -> None:
-        """Write recorded edges in order of time.
+    def write(self, edges: NDArray[Any], signal_of: Mapping[int, int], numbers: Iterable[tuple[int, int]] = ()) -> None:
+        """Write recorded edges, and values of the first number with the cycles from which they hold, in order of time.
 
         Args:
             edges: structured array with fields cycle, pin and level.
             signal_of: index of the signal of each pin; edges of other pins are passed over.
+            numbers: in order of time; at the same cycle they come after the edges.
 
         Raises:
             TraceError: edges before the latest moment written.
         """
+        done = 0
+        for cycle, value in numbers:
+            until = int(np.searchsorted(edges["cycle"], cycle, side="right"))
+            self._write_edges(edges[done:until], signal_of)
+            self.number(cycle, 0, value)
+            done = until
+        self._write_edges(edges[done:], signal_of)
+
+    def _write_edges(self, edges: NDArray[Any], signal_of: Mapping[int, int]) -> None:
         for cycle, pin, level in edges[["cycle", "pin", "level"]].tolist():
             if pin in signal_of:
                 self.change(cycle, signal_of[pin], level)

@@ -4,6 +4,7 @@
 ``sim://``                      the emulated Uno in this process, in virtual time, with the released image
 ``sim://?image=PATH``           the same with another flash image (Intel HEX)
 ``sim://?usb=16u2``             the same with the delays and limits of the board's USB bridge
+``sim://?isr=1``                the same, its waveforms tell which interrupt runs (`isr`); about three times slower
 ``/dev/ttyACM0``, ``COM3``      a serial port or a pty
 ``file://PATH``                 what is sent goes into a file, and an emulated board answers
 ``spy+URL``, ``spy+URL#FILE``   any of these, with everything that passes in a journal (spy.journal)
@@ -136,7 +137,14 @@ def _open_emulator(url: str, baud: int, setup: ArmSetup | None) -> Transport:
     options = parse_qs(parts.query, keep_blank_values=True)
     kinds: dict[str, Literal["direct", "16u2"]] = {"direct": "direct", "16u2": "16u2"}
     usb = kinds.get(options.get("usb", ["direct"])[-1])
-    if parts.netloc or parts.path or set(options) - {"image", "usb"} or usb is None:
-        raise LinkError(f"port {url!r}: the emulator takes sim://, sim://?image=PATH, sim://?usb=16u2, or both by &")
+    isr = {"0": False, "1": True}.get(options.get("isr", ["0"])[-1])
+    if parts.netloc or parts.path or set(options) - {"image", "usb", "isr"} or usb is None or isr is None:
+        raise LinkError(
+            f"port {url!r}: the emulator takes sim://, sim://?image=PATH, sim://?usb=16u2, sim://?isr=1, "
+            "or several of these by &"
+        )
     images = options.get("image")
-    return SimTransport(images[-1] if images else released_image(), baud, setup, usb)
+    line = SimTransport(images[-1] if images else released_image(), baud, setup, usb)
+    if isr:
+        line.uno.observe()
+    return line
