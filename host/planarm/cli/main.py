@@ -274,6 +274,7 @@ def _add_emulate(commands: Commands) -> None:
     command.add_argument("--fault-seed", type=int, metavar="N", help="in place of the schedule's own seed")
     command.add_argument("--link", metavar="PATH", help="make PATH a link to the pty")
     command.add_argument("--vcd", metavar="FILE", help="write the pins' waveforms")
+    command.add_argument("--isr", action="store_true", help="with --vcd: also which interrupt runs; runs slower")
     command.add_argument("--serial-log", metavar="FILE", help="write every byte on the serial line and its cycles")
     command.add_argument(
         "--profile", metavar="FILE", help="write interrupts, load, stack and cycles per function (JSON); runs slower"
