@@ -8,7 +8,7 @@ obstacles left. So the work grows with the border between free and blocked, and 
 than ten.
 """
 
-from math import acos, sqrt
+from math import acos, inf, sqrt
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,10 +22,11 @@ from planarm.workspace.world import (
     INNER_HOLE,
     LIMIT,
     OBSTACLE,
+    SINGULAR_CM,
     ArmWorld,
+    TwoLinkArm,
     cos_beta_at,
     elbow_at,
-    elbow_from_base,
     floor_clearance,
     links_apart2,
     region_at,
@@ -41,6 +42,15 @@ LEAF_CELLS = 8
 """Blocks of so many rows and columns are judged cell by cell: found by measurement."""
 
 LARGEST_BLOCK = 256
+
+MOST_CELLS = LEAF_CELLS * LEAF_CELLS
+WORK_ROWS = 8
+X, Y, R, EX, EY, MOVES, BESIDE, SPARE = range(0, WORK_ROWS * MOST_CELLS, MOST_CELLS)
+"""Where the cells' values begin in one array: tip, its distance and elbow, seen from the base; the bound of how far the
+arm moves within the cell; what the nearest obstacle leaves of the margin, without that bound and with it, in places of
+squares: above 0 or not. In one array at fixed distances the compiler sees that they do not overlap, and takes four cells
+at once.
+"""
 
 MIXED_BLOCK = 255
 """Stands for a block's region where its cells differ, or might."""
@@ -58,12 +68,13 @@ def fill(
         block *= 2
     near = np.empty(12 * (obstacles + 1), np.int64)
     stack = np.empty((64, 4), np.int64)
+    work = np.empty(WORK_ROWS * MOST_CELLS)
     for top in range(0, rows, block):
         for left in range(0, columns, block):
             for i in range(obstacles):
                 near[i] = i
             stack[0, 0], stack[0, 1], stack[0, 2], stack[0, 3] = top, left, block, 0
-            _fill_block(world, x_cm, y_cm, cell_cm, region, whole, stack, near, obstacles)
+            _fill_block(world, x_cm, y_cm, cell_cm, region, whole, stack, near, obstacles, work)
 
 
 @kernel
@@ -77,6 +88,7 @@ def _fill_block(
     stack: Ints,
     near: Ints,
     obstacles: int,
+    work: Floats,
 ) -> None:
     """Divide and judge the block on the stack: rows (iy, ix, size, place of its list of obstacles in `near`).
 
@@ -103,7 +115,9 @@ def _fill_block(
                     if whole.size > 0:
                         whole[y_at, x_at] = verdict == FREE
         elif size <= LEAF_CELLS:
-            _fill_cells(world, x_cm, y_cm, cell_cm, region, whole, iy, bottom, ix, right, near[end:kept], no_limit)
+            _fill_cells(
+                world, x_cm, y_cm, cell_cm, region, whole, iy, bottom, ix, right, near[end:kept], no_limit, work
+            )
         else:
             half = size // 2
             for i in range(4):
@@ -179,54 +193,102 @@ def _fill_cells(
     right: int,
     near: Ints,
     no_limit: bool,
+    work: Floats,
 ) -> None:
-    """Judge the cells of a small block one by one."""
-    arm = world.arm
-    centers, radii, first_vertex = world.obstacles.centers_cm, world.obstacles.radii_cm, world.obstacles.first_vertex
+    """Judge the cells of a small block; `work` has WORK_ROWS * MOST_CELLS places."""
+    arm, obstacles = world.arm, world.obstacles
+    columns = right - left
+    cells = columns * (bottom - top)
+    _pose_cells(arm, x_cm[left:right], y_cm[top:bottom], work)
     proving = whole.size > 0
-    bx, by, margin, rho = arm.base_x_cm, arm.base_y_cm, arm.margin_cm, 0.5 * sqrt(2.0) * cell_cm
-    for iy in range(top, bottom):
-        for ix in range(left, right):
-            x, y = x_cm[ix] - bx, y_cm[iy] - by
-            r2 = x * x + y * y
-            r = sqrt(r2)
-            node = region_at(arm, r)
-            if node != FREE:
-                region[iy, ix] = node
-                if proving:
-                    whole[iy, ix] = False
+    rho = 0.5 * sqrt(2.0) * cell_cm
+    if proving:
+        for c in range(cells):
+            r = work[R + c]
+            inside = region_at(arm, r) == FREE and rho < r and disc_within_reach(arm, r, rho)
+            work[MOVES + c] = displacement_bound(arm, r, rho) + ROUNDING_CM if inside else inf
+    for i in near:
+        cx, cy = obstacles.centers_cm[i, 0] - arm.base_x_cm, obstacles.centers_cm[i, 1] - arm.base_y_cm
+        keep = obstacles.radii_cm[i] + arm.margin_cm
+        if obstacles.first_vertex[i] == obstacles.first_vertex[i + 1]:
+            _keep_off_circle(arm, cx, cy, keep, cells, proving, work)
+            continue
+        for c in range(cells):
+            ex, ey, x, y, moves = work[EX + c], work[EY + c], work[X + c], work[Y + c], work[MOVES + c]
+            bound = keep + moves if proving else keep
+            if region_at(arm, work[R + c]) != FREE or (
+                links_apart2(cx, cy, ex, ey, x, y, arm.per_l1, arm.per_l2) > bound * bound
+            ):
                 continue
-            ex, ey = elbow_from_base(arm, x, y, r2, r)
-            free = proving and rho < r and disc_within_reach(arm, r, rho)
-            moves = displacement_bound(arm, r, rho) + ROUNDING_CM if free else 0.0
-            if not no_limit and not within_limits(arm, ex + bx, ey + by, moves):
-                free = False
-                theta1 = theta1_at(arm, x + bx, y + by, acos(cos_beta_at(arm, r)))
-                if theta1 < arm.theta1_min_rad or theta1 > arm.theta1_max_rad:
-                    region[iy, ix] = LIMIT
-                    if proving:
-                        whole[iy, ix] = False
-                    continue
-            if arm.floor:
-                height = floor_clearance(arm, ey + by, y + by)
-                free = free and height > margin + moves
-                if height <= margin:
-                    region[iy, ix] = LIMIT
-                    if proving:
-                        whole[iy, ix] = False
-                    continue
-            for i in near:
-                cx, cy, keep = centers[i, 0] - bx, centers[i, 1] - by, radii[i] + margin
-                apart2 = links_apart2(cx, cy, ex, ey, x, y, arm.per_l1, arm.per_l2)
-                blocked = apart2 <= keep * keep
-                clear = apart2 > (keep + moves) * (keep + moves)
-                if not clear and first_vertex[i] != first_vertex[i + 1]:
-                    apart = _clearance(world, i, ex + bx, ey + by, x + bx, y + by, margin + moves)
-                    blocked, clear = apart <= margin, apart > margin + moves
-                free = free and clear
-                if blocked:
-                    node, free = OBSTACLE, False
-                    break
+            bx, by, margin = arm.base_x_cm, arm.base_y_cm, arm.margin_cm
+            apart = _clearance(world, i, ex + bx, ey + by, x + bx, y + by, margin + (moves if proving else 0.0))
+            work[BESIDE + c] = min(work[BESIDE + c], apart - margin)
+            work[SPARE + c] = min(work[SPARE + c], apart - margin - moves)
+    limited = not no_limit or arm.floor
+    for iy in range(top, bottom):
+        first = (iy - top) * columns - left
+        for ix in range(left, right):
+            c = first + ix
+            node = region_at(arm, work[R + c])
+            free = proving and node == FREE and work[MOVES + c] < inf and work[SPARE + c] > 0.0
+            if node == FREE and limited:
+                moves = work[MOVES + c] if free else 0.0
+                bounded, within = _limits(arm, work, c, moves, no_limit)
+                free = free and bounded
+                node = node if within else LIMIT
+            if node == FREE and work[BESIDE + c] <= 0.0:
+                node = OBSTACLE
             region[iy, ix] = node
             if proving:
-                whole[iy, ix] = free
+                whole[iy, ix] = free and node == FREE
+
+
+@kernel
+def _pose_cells(arm: TwoLinkArm, x_cm: Floats, y_cm: Floats, work: Floats) -> None:
+    """Fill in, for the cells row by row, tip, its distance and elbow, seen from the base, and that nothing is near."""
+    l1, l2, side = arm.l1_cm, arm.l2_cm, arm.side
+    difference, columns = l1 * l1 - l2 * l2, x_cm.size
+    for row in range(y_cm.size):
+        first, y = row * columns, y_cm[row] - arm.base_y_cm
+        for ix in range(columns):
+            x = x_cm[ix] - arm.base_x_cm
+            c = first + ix
+            r2 = x * x + y * y
+            r = sqrt(r2)
+            per_r = 1.0 / max(r, SINGULAR_CM)
+            along = min(l1, max(-l1, 0.5 * (r2 + difference) * per_r))
+            aside = side * sqrt(l1 * l1 - along * along)
+            work[X + c], work[Y + c], work[R + c] = x, y, r
+            work[EX + c], work[EY + c] = per_r * (x * along - y * aside), per_r * (y * along + x * aside)
+            work[BESIDE + c], work[SPARE + c] = inf, inf
+
+
+@kernel
+def _keep_off_circle(
+    arm: TwoLinkArm, cx: float, cy: float, keep_cm: float, cells: int, proving: bool, work: Floats
+) -> None:
+    """Note how a circle's distance from the links compares with `keep_cm`, and with that and the cell's moves."""
+    per_l1, per_l2 = arm.per_l1, arm.per_l2
+    if proving:
+        for c in range(cells):
+            apart2 = links_apart2(cx, cy, work[EX + c], work[EY + c], work[X + c], work[Y + c], per_l1, per_l2)
+            bound = keep_cm + work[MOVES + c]
+            work[BESIDE + c] = min(work[BESIDE + c], apart2 - keep_cm * keep_cm)
+            work[SPARE + c] = min(work[SPARE + c], apart2 - bound * bound)
+    else:
+        for c in range(cells):
+            apart2 = links_apart2(cx, cy, work[EX + c], work[EY + c], work[X + c], work[Y + c], per_l1, per_l2)
+            work[BESIDE + c] = min(work[BESIDE + c], apart2 - keep_cm * keep_cm)
+
+
+@kernel
+def _limits(arm: TwoLinkArm, work: Floats, c: int, moves_cm: float, no_limit: bool) -> tuple[bool, bool]:
+    """Tell whether limits of joint 1 and floor are kept by all poses of a cell, and whether by the one at its node."""
+    bx, by = arm.base_x_cm, arm.base_y_cm
+    ex, ey, x, y = work[EX + c], work[EY + c], work[X + c], work[Y + c]
+    bounded, within = True, True
+    if not no_limit and not within_limits(arm, ex + bx, ey + by, moves_cm):
+        theta1 = theta1_at(arm, x + bx, y + by, acos(cos_beta_at(arm, work[R + c])))
+        bounded, within = False, arm.theta1_min_rad <= theta1 <= arm.theta1_max_rad
+    height = floor_clearance(arm, ey + by, y + by)
+    return bounded and height > arm.margin_cm + moves_cm, within and height > arm.margin_cm
