@@ -48,7 +48,7 @@ WORK_ROWS = 8
 X, Y, R, EX, EY, MOVES, BESIDE, SPARE = range(0, WORK_ROWS * MOST_CELLS, MOST_CELLS)
 """Where the cells' values begin in one array: tip, its distance and elbow, seen from the base; the bound of how far the
 arm moves within the cell; what the nearest obstacle leaves of the margin, without that bound and with it, in places of
-squares: above 0 or not. In one array at fixed distances the compiler sees that they do not overlap, and takes four cells
+squares: above 0 or not. In one array at fixed distances the compiler sees that they do not overlap and takes four cells
 at once.
 """
 
