@@ -69,7 +69,9 @@ def find_library(name: str) -> Path:
     for folder in (LIBRARIES, *USER_LIBRARIES):
         if (folder / name / "src").is_dir():
             return folder / name / "src"
-    pytest.skip(f"the Arduino library {name} is not installed in {', '.join(map(str, (LIBRARIES, *USER_LIBRARIES)))}")
+    stand_in = " (Debian ships none); servo_by_timer.ino is tested in its place" if name == "Servo" else ""
+    places = ", ".join(map(str, (LIBRARIES, *USER_LIBRARIES)))
+    pytest.skip(f"the Arduino library {name} is not installed in {places}{stand_in}")
 
 
 def build_sketch(sketch: Path, folder: Path, cache: Path, libraries: tuple[str, ...] = ()) -> Path:

@@ -171,8 +171,10 @@ def decoded(edges, bit):
     return bytes(result)
 
 
-def test_servos_get_their_pulses(sketch):
-    uno = sketch("servo", "Servo", setup_s=0.5)
+@pytest.mark.parametrize(("source", "libraries"), [("servo_by_timer", ()), ("servo", ("Servo",))])
+def test_servos_get_their_pulses(sketch, source, libraries):
+    """By Arduino's library where it is installed, and by a sketch of our own that drives timer 1 as that does."""
+    uno = sketch(source, *libraries, setup_s=0.5)
     # Servo.h: write(90) is the middle of 544 to 2400 us, frames of 20 ms; its timer counts half microseconds.
     for pin, width_us in (("D9", (544 + 2400) / 2), ("D10", 1000)):
         edges = uno.edges(pin)[2:]
