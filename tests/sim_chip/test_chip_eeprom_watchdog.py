@@ -109,6 +109,15 @@ def test_wdr_keeps_the_watchdog_quiet():
     assert chip.run_to(1_000_000) is StopCause.REACHED
 
 
+def test_interrupts_alone_come_again_and_again():
+    # WDIE without WDE: WDIE stays, and no time-out resets (table 11-1).
+    chip = Chip(assemble(WATCHDOG.format(vector="sbi 0x1E, 0\ninc r6\nreti", setting=0x40, body="nop")))
+    assert chip.run_to(9 + 3 * 256_000 + 100) is StopCause.REACHED
+    assert chip.registers[6] == 3
+    chip.run_to(9 + 4 * 256_000 + 100)
+    assert chip.registers[6] == 4
+
+
 def test_interrupt_first_reset_next():
     # WDIE and WDE: the interrupt clears WDIE, the next time-out resets (table 11-1).
     chip = Chip(assemble(WATCHDOG.format(vector="sbi 0x1E, 0\nreti", setting=0x48, body="nop")))

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from planarm_sim.plant.plant import Contact, Plant, Slip, StopHit, SwitchChange
+from planarm_sim.plant.happenings import Contact, Slip, StopHit, SwitchChange
+from planarm_sim.plant.plant import Plant
 from planarm_sim.plant.spec import CircleObstacle, Joint, LimitSwitch, Link, Motor, PolygonObstacle, Rig, desk_arm
 
 __all__ = [

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -11,20 +10,17 @@ from numpy.typing import NDArray
 
 from planarm_sim.errors import UsageError
 from planarm_sim.plant import layout, simulate
+from planarm_sim.plant.build import CYCLES_PER_S, body_of, drive_of, fitting_step, start_of, switches_of
 from planarm_sim.plant.contact import obstacle_arrays
-from planarm_sim.plant.rigid_body import energy_j, inertia_constants
+from planarm_sim.plant.happenings import Contact, Slip, StopHit, SwitchChange
+from planarm_sim.plant.rigid_body import energy_j
 from planarm_sim.plant.spec import Rig
 
-__all__ = ["Contact", "Plant", "Slip", "StopHit", "SwitchChange"]
+__all__ = ["Plant"]
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-CYCLES_PER_S = 16_000_000
-LONGEST_STEP_CYCLES = 800
-"""50 us, a chopper's period: a thirtieth of an electrical turn at 2,500 full steps a second."""
-STABLE_SHARE = 0.25
-"""Longest step as a share of the fastest vibration's 1 / omega."""
 SAMPLE_CYCLES = 8000
 """Time between samples of the motion, 0.5 ms."""
 CHUNK_STEPS = 4000
@@ -35,58 +31,6 @@ REST_A = 1e-9
 """Where all moves slower and no current changes more, nothing will move before something is asked for."""
 NO_EVENTS = np.empty((0, 4), np.int64)
 PHASE_PER_STEP = 256
-
-
-@dataclass(frozen=True, slots=True)
-class Slip:
-    """A rotor lost its step: it stays a whole electrical turn behind its driver, or gets one ahead.
-
-    Attributes:
-        cycle: clock cycle.
-        motor: number from 0.
-        full_steps: 4 when it fell behind in the positive sense, -4 in the negative.
-        speed_rad_s: of the rotor then.
-    """
-
-    cycle: int
-    motor: int
-    full_steps: int
-    speed_rad_s: float
-
-
-@dataclass(frozen=True, slots=True)
-class Contact:
-    """A link touched an obstacle.
-
-    Attributes:
-        cycle: clock cycle of the first touch.
-        link: number from 0.
-        obstacle: number from 0.
-        place: where on the link, as a share of its length.
-    """
-
-    cycle: int
-    link: int
-    obstacle: int
-    place: float
-
-
-@dataclass(frozen=True, slots=True)
-class StopHit:
-    """A joint ran into its hard stop, at an angle."""
-
-    cycle: int
-    joint: int
-    q_rad: float
-
-
-@dataclass(frozen=True, slots=True)
-class SwitchChange:
-    """A limit switch was pressed or let go of."""
-
-    cycle: int
-    switch: int
-    pressed: bool
 
 
 class Plant:
@@ -110,16 +54,16 @@ class Plant:
         propped: bool = False,
     ) -> None:
         self.rig = rig
-        self._step_cycles = step_cycles or _fitting_step(rig)
+        self._step_cycles = step_cycles or fitting_step(rig)
         self._begin = cycle
         self._cycle = cycle
         self._sample_cycles = sample_cycles
         n = len(rig.links)
-        self._body = _body(rig)
-        self._drive = _drive(rig)
+        self._body = body_of(rig)
+        self._drive = drive_of(rig)
         self._obstacles = obstacle_arrays(rig.obstacles)
-        self._state = _start(rig, self._drive)
-        self._switches = _switches(rig)
+        self._state = start_of(rig, self._drive)
+        self._switches = switches_of(rig)
         size = len(self._state.y)
         self._work = layout.Work(np.zeros((4, size)), np.zeros(size), *(np.zeros(s) for s in ((n, n), n, n, (n, n), n)))
         self._marks: list[Floats] = []
@@ -367,91 +311,3 @@ class Plant:
     def _rotors_at(self, q_rad: Floats) -> Floats:
         turned: Floats = self._drive.coupling @ (q_rad - self._drive.zero) / self._drive.gear
         return turned
-
-
-def _body(rig: Rig) -> layout.Body:
-    a, b = inertia_constants(rig.links)
-    return layout.Body(
-        a=a,
-        b=b,
-        lengths=np.array([link.length_m for link in rig.links]),
-        half_widths=np.array([max(0.5 * link.width_m, 5e-4) for link in rig.links]),
-        base=np.array(rig.base_m, dtype=float),
-        gravity=float(rig.gravity_m_s2),
-        viscous=np.array([joint.viscous_nm_s for joint in rig.joints]),
-        stops=np.array([joint.stops_rad for joint in rig.joints], dtype=float),
-    )
-
-
-def _drive(rig: Rig) -> layout.Drive:
-    motors = rig.motors
-    return layout.Drive(
-        coupling=np.ascontiguousarray(rig.coupling_matrix[: len(motors)]),
-        zero=rig.zeros,
-        gear=np.array([(-1.0 if m.reversed else 1.0) / m.gear_ratio for m in motors]),
-        half_play=np.array([0.5 * m.backlash_rad for m in motors]),
-        stiffness=np.array([m.stiffness_nm_rad for m in motors]),
-        gear_damping=np.array([m.output_damping_nm_s for m in motors]),
-        teeth=np.array([m.steps_per_rev / 4.0 for m in motors]),
-        torque_constant=np.array([m.torque_constant_nm_a for m in motors]),
-        detent=np.array([m.detent_torque_nm for m in motors]),
-        inertia=np.array([m.rotor_inertia_kg_m2 for m in motors]),
-        damping=np.array([m.damping_nm_s for m in motors]),
-        resistance=np.array([m.resistance_ohm for m in motors]),
-        inductance=np.array([m.inductance_h for m in motors]),
-        current=np.array([m.current_a for m in motors]),
-    )
-
-
-def _start(rig: Rig, drive: layout.Drive) -> layout.State:
-    n, m = len(rig.links), len(rig.motors)
-    start = np.array(rig.start_rad, dtype=float)
-    rotors = drive.coupling @ (start - drive.zero) / drive.gear
-    phase = np.rint(rotors * drive.teeth * 512.0 / np.pi) * (np.pi / 512.0)
-    return layout.State(
-        y=np.concatenate([np.cumsum(start), np.zeros(n), rotors, np.zeros(m)]),
-        currents=np.zeros((m, 2)),
-        phase=phase,
-        on=np.zeros(m, np.int64),
-        supply=np.array([motor.supply_v for motor in rig.motors]),
-        lost=np.zeros(m, np.int64),
-        friction=np.zeros(n),
-        rotor_friction=np.zeros(m),
-        coulomb=np.array([joint.coulomb_nm for joint in rig.joints]),
-        rotor_coulomb=np.array([motor.coulomb_nm for motor in rig.motors]),
-        outside=np.zeros(n),
-        touching=np.zeros((n, len(rig.obstacles))),
-        stopped=np.zeros(n, np.int64),
-    )
-
-
-def _switches(rig: Rig) -> layout.Switches:
-    pressed = [(rig.start_rad[s.joint] >= s.at_rad) == s.above for s in rig.switches]
-    return layout.Switches(
-        joint=np.array([s.joint for s in rig.switches], dtype=np.int64),
-        at=np.array([s.at_rad for s in rig.switches], dtype=float),
-        above=np.array([s.above for s in rig.switches], dtype=np.int64),
-        pressed=np.array(pressed, dtype=np.int64),
-    )
-
-
-def _fitting_step(rig: Rig) -> int:
-    """Return the longest step, 800 cycles halved so often as is needed, that follows the rotors' fastest vibration."""
-    omega = max(
-        (
-            np.sqrt(
-                (
-                    m.stiffness_nm_rad / m.gear_ratio**2
-                    + m.peak_torque_nm * m.steps_per_rev / 4.0
-                    + m.detent_torque_nm * m.steps_per_rev
-                )
-                / m.rotor_inertia_kg_m2
-            )
-            for m in rig.motors
-        ),
-        default=0.0,
-    )
-    step = LONGEST_STEP_CYCLES
-    while step > 1 and step / CYCLES_PER_S * omega > STABLE_SHARE and step % 2 == 0:
-        step //= 2
-    return step

@@ -6,7 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from planarm_sim.plant.plant import CYCLES_PER_S, PHASE_PER_STEP, Plant
+from planarm_sim.plant.build import CYCLES_PER_S
+from planarm_sim.plant.plant import PHASE_PER_STEP, Plant
 from planarm_sim.plant.spec import Joint, Link, Motor, Rig
 
 __all__ = ["pull_out_steps_s"]
