@@ -16,6 +16,7 @@ import serial.rfc2217
 
 from link_echo import write_echo_image
 from link_model import motion
+from planarm.cli.main import main
 from planarm.errors import LinkError
 from planarm.link.doctor import ask_board, examine
 from planarm.link.exchange import stream_plan
@@ -126,6 +127,46 @@ def test_holders_are_found_in_proc(tmp_path):
         (descriptors.parent / "cmdline").write_bytes(command)
     (tmp_path / "proc" / "9").mkdir()
     assert holders(str(device), tmp_path / "proc") == (Holder(7, "screen /dev/ttyACM0"),)
+
+
+@pytest.mark.parametrize(
+    ("words", "ours"),
+    [
+        (("/usr/bin/python3", "/home/x/.venv/bin/planarm", "run", "a.toml"), True),
+        (("/home/x/bin/planarm", "run"), True),
+        (("python", "-m", "planarm", "goto"), True),
+        (("python", "-c", "from planarm.cli.main import main; main()", "run"), True),
+        (("screen", "/dev/ttyACM0"), False),
+        (("minicom", "-C", "/home/x/planarm/log"), False),
+    ],
+)
+def test_our_own_programs_are_known(tmp_path, words, ours):
+    """Others are not sent signals, even when they have something of ours among their words."""
+    device = tmp_path / "ttyACM0"
+    device.write_text("")
+    descriptors = tmp_path / "proc" / "7" / "fd"
+    descriptors.mkdir(parents=True)
+    (descriptors / "3").symlink_to(device)
+    (descriptors.parent / "cmdline").write_bytes("\0".join((*words, "")).encode())
+    assert [one.is_planarm for one in holders(str(device), tmp_path / "proc")] == [ours]
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="Linux tells in /proc who has a file open")
+@pytest.mark.parametrize("more", [[], ["--emergency"]])
+def test_stop_names_a_foreign_program_that_has_the_port_and_says_what_to_do(terminal, more, capsys):
+    words = [sys.executable, "-c", "import sys; f = open(sys.argv[1]); print('open', flush=True); sys.stdin.read()"]
+    with subprocess.Popen([*words, terminal], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as other:
+        assert other.stdout.readline() == "open\n"
+        with pytest.raises(SystemExit) as left:
+            main(["stop", "--port", terminal, *more])
+        assert other.poll() is None, "it was left alone"
+        other.stdin.close()
+    told = " ".join(capsys.readouterr().err.split())
+    assert left.value.code == 5
+    assert f"in use by process {other.pid} (python" in told
+    advice = "which planarm cannot ask to stop; stop the motion there" if not more else "without --emergency"
+    assert advice in told
+    assert "cut the motors' supply" in told
 
 
 def test_the_doctor_names_ports_by_id_and_what_needs_a_hand(tmp_path, monkeypatch):

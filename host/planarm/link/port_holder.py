@@ -8,10 +8,11 @@ PROC = Path("/proc")
 
 @dataclass(frozen=True, slots=True)
 class Holder:
-    """A process that has the device open."""
+    """A process that has the device open; `is_planarm` tells whether it is one of ours, which knows how to stop."""
 
     pid: int
     command: str
+    is_planarm: bool = False
 
     def __str__(self) -> str:
         return f"process {self.pid} ({self.command})"
@@ -23,7 +24,8 @@ def holders(device: str, proc: Path = PROC) -> tuple[Holder, ...]:
     found = []
     for folder in proc.glob("[0-9]*"):
         if _has_open(folder, wanted):
-            found.append(Holder(int(folder.name), _command(folder)))
+            words = _words(folder)
+            found.append(Holder(int(folder.name), _command(words), _is_planarm(words)))
     return tuple(sorted(found, key=lambda holder: holder.pid))
 
 
@@ -34,13 +36,23 @@ def _has_open(folder: Path, wanted: Path) -> bool:
         return False
 
 
-def _command(folder: Path) -> str:
-    """The process's command line, without the interpreter's path and short enough for a sentence."""
+def _words(folder: Path) -> list[str]:
+    """The process's command line; empty when it has gone meanwhile, or has none."""
     try:
-        words = [word for word in (folder / "cmdline").read_bytes().decode(errors="replace").split("\0") if word]
+        return [word for word in (folder / "cmdline").read_bytes().decode(errors="replace").split("\0") if word]
     except OSError:
-        return "gone meanwhile"
+        return []
+
+
+def _command(words: list[str]) -> str:
+    """A command line without the interpreter's path and short enough for a sentence."""
     if not words:
         return "unnamed"
     text = " ".join([Path(words[0]).name, *words[1:]])
     return text if len(text) <= 80 else text[:77] + "..."
+
+
+def _is_planarm(words: list[str]) -> bool:
+    """Whether the program is `planarm`: the script, `python -m planarm`, or Python told to import its command line."""
+    program = words[:3]
+    return any(Path(word).name == "planarm" for word in program) or any("planarm.cli" in word for word in program)
