@@ -155,7 +155,11 @@ _planarm() {{
 {cases}
   esac
 }}
-compdef _planarm planarm
+if [ "$funcstack[1]" = "_planarm" ]; then  # called from a folder of $fpath
+  _planarm "$@"
+else
+  compdef _planarm planarm
+fi
 """
 
 SCRIPTS: Mapping[str, Callable[[tuple[Command, ...]], str]] = {"bash": bash, "zsh": zsh, "fish": fish}
