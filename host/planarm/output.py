@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -17,6 +18,19 @@ def writing(path: Path) -> Iterator[None]:
     except OSError as error:
         cause = error.strerror or str(error)
         raise OutputError(f"{path}: cannot be written: {cause}; give another place, or make room for it") from error
+
+
+def require_folder_place(path: Path) -> None:
+    """Refuse a folder's path that cannot become one, before any work is done for it.
+
+    Raises:
+        OutputError: `path`, or what it would lie in, is a file, or may not be written into.
+    """
+    there = next(folder for folder in (path, *path.absolute().parents) if folder.exists())
+    if not there.is_dir():
+        raise OutputError(f"{path}: cannot be written: {there} is a file; give the path of a folder")
+    if not os.access(there, os.W_OK | os.X_OK):
+        raise OutputError(f"{path}: cannot be written: {there} may not be written into; give another place")
 
 
 def require_place(path: Path) -> None:

@@ -285,7 +285,7 @@ def test_failures_are_told_by_kind_with_the_line_that_repeats_one(tmp_path, caps
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (["report", "none"], "is no folder of results"),
+        (["report", "none"], "has neither a run's record.json nor a campaign's"),
         (["campaign", "none.toml"], "none.toml: cannot be read"),
         (["campaign", "campaign.toml", "--only", "99"], "has 6 runs, counted from 0"),
         (

@@ -87,7 +87,9 @@ def load_campaign(path: Path) -> Campaign:
     try:
         data = tomllib.loads(path.read_text(encoding="utf-8"))
     except OSError as error:
-        raise SceneError(str(path), "", f"cannot be read: {error.strerror}") from error
+        raise SceneError(
+            str(path), "", f"cannot be read: {error.strerror}; give the path of a sweep or campaign (docs/scale.md)"
+        ) from error
     except ValueError as error:
         raise SceneError(str(path), "", f"is not valid TOML: {error}") from error
     root = Table.with_keys(str(path), "", data, ROOT_KEYS)

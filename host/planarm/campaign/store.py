@@ -167,7 +167,10 @@ def read_about(folder: Path) -> About:
     """
     found = _read_about(folder)
     if found is None:
-        raise UsageError(f"{folder}: is no folder of results (no {ABOUT} in it)")
+        raise UsageError(
+            f"{folder}: has neither a run's record.json nor a campaign's {ABOUT}; give a folder that run, sweep or"
+            " campaign wrote (--out)"
+        )
     return found
 
 

@@ -25,6 +25,8 @@ def execute(options: argparse.Namespace) -> int:
             lines.append(Line(None, "--", "the last record was cut short: its bytes were not sent"))
     else:
         lines = list(stream_lines(path.read_bytes(), dump))
+    if not lines:
+        raise JournalError(f"{path}: is no journal and has no message in it; give a run's folder, or bytes of the line")
     if options.json:
         print(json.dumps(dump.figures.figures()))
         return 0

@@ -8,14 +8,10 @@ import json
 import os
 import sys
 from collections.abc import Sequence
-from typing import Any, NoReturn, TypeAlias
 
 import planarm
+from planarm.cli.parser import EXIT_CODES, Commands, Parser
 from planarm.errors import OutputError, PlanarmError, UsageError
-
-EXIT_CODES = """exit codes:
-  0 ok    2 bad input    3 no path    4 cannot be timed or certified
-  5 link    6 device fault    7 executed steps differ from the plan"""
 
 STOPPED_READING = 141
 """What a shell reports of a program that a closed pipe has ended."""
@@ -42,7 +38,11 @@ def _run(words: Sequence[str]) -> int:
     """Run the command that the words ask for; return its exit code."""
     as_json = "--json" in words
     try:
-        options = build_parser().parse_args(words)
+        parser = build_parser()
+        if not words:
+            parser.print_help(sys.stderr)
+            return UsageError.exit_code
+        options = parser.parse_args(words)
         command = importlib.import_module(f"planarm.cli.{options.command}")
         return int(command.execute(options))
     except PlanarmError as error:
@@ -65,19 +65,9 @@ class Stopped(PlanarmError):  # noqa: N818 - not an error
     exit_code = 130
 
 
-class _Parser(argparse.ArgumentParser):
-    """A parser that keeps the exit codes' table as it is, and whose errors are told like all others."""
-
-    def __init__(self, **settings: Any) -> None:  # noqa: ANN401 - handed on as they are
-        super().__init__(formatter_class=argparse.RawDescriptionHelpFormatter, **settings)
-
-    def error(self, message: str) -> NoReturn:
-        raise UsageError(f"{message}; '{self.prog} --help' tells what there is")
-
-
-def build_parser() -> argparse.ArgumentParser:
+def build_parser() -> Parser:
     """Return the whole command line's parser."""
-    parser = _Parser(
+    parser = Parser(
         prog="planarm",
         description="From a scene file to proven step pulses on an Arduino Uno.",
         epilog=EXIT_CODES,
@@ -118,9 +108,6 @@ def report_error(error: PlanarmError, as_json: bool) -> None:
             print(f"  'planarm explain {error.code}' tells more", file=sys.stderr)
         if error.advice:
             print("What would help:", *(f"  - {sentence}" for sentence in error.advice), sep="\n", file=sys.stderr)
-
-
-Commands: TypeAlias = "argparse._SubParsersAction[_Parser]"
 
 
 def _add_plan(commands: Commands) -> None:

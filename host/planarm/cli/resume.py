@@ -10,7 +10,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from planarm.cli.progress import progress
-from planarm.cli.scenes import tell_first_compile
+from planarm.cli.scenes import require_file, tell_first_compile
+from planarm.errors import JournalError
 
 if TYPE_CHECKING:
     from planarm.link.position import PositionReport
@@ -18,6 +19,7 @@ if TYPE_CHECKING:
 
 def execute(options: argparse.Namespace) -> int:
     """Tell the verdict; unless only asked for that, go on with the run."""
+    require_file(str(Path(options.run) / "run.journal"), JournalError, "give the folder of a run")
     tell_first_compile("planarm", "planarm_sim")
     from planarm.link.positions import Positions, default_path
     from planarm.link.transport import open_transport

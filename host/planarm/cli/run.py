@@ -9,19 +9,23 @@ from pathlib import Path
 
 from planarm.cli.live import live_view
 from planarm.cli.progress import progress
-from planarm.cli.scenes import chosen_scene, compile_first
+from planarm.cli.scenes import chosen_scene, compile_first, require_file
 from planarm.cli.terminal import terminal
-from planarm.errors import PlanarmError
+from planarm.errors import EmulatorError, PlanarmError
+from planarm.output import require_folder_place
 
 
 def execute(options: argparse.Namespace) -> int:
     """Run the whole flow and print its summary."""
     scene = chosen_scene(options)
+    out = Path(options.out or Path("out") / f"{Path(scene.source).stem}-{scene.planner.algorithm}")
+    require_folder_place(out)
+    if options.faults:
+        require_file(options.faults, EmulatorError, "give the path of a schedule of faults (docs/faults.md)")
     compile_first("planarm", "planarm_sim")
     from planarm.pipeline import run_scene
     from planarm.warm_up import warm_up
 
-    out = Path(options.out or Path("out") / f"{Path(scene.source).stem}-{scene.planner.algorithm}")
     with progress(options.json or options.live == "terminal") as notice:
         notice("kernels", 0.0)
         warm_up(on_roadmap=scene.planner.on_roadmap, moving=scene.moving is not None)

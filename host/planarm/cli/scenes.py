@@ -6,6 +6,7 @@ import argparse
 import sys
 from pathlib import Path
 
+from planarm.errors import PlanarmError
 from planarm.first_start import compile_parts
 from planarm.scene import Scene, load_scene, with_planner, with_space
 from planarm_wire.kernel_cache import is_cold
@@ -19,6 +20,24 @@ def chosen_scene(options: argparse.Namespace) -> Scene:
     """
     scene = with_space(load_scene(Path(options.scene)), options.space)
     return with_planner(scene, algorithm=options.planner, neighbours=options.neighbours, seed=options.seed)
+
+
+def require_file(name: str, error: type[PlanarmError], advice: str) -> None:
+    """Refuse a file that cannot be read, before anything that takes time is done for it.
+
+    Args:
+        name: its path, as it was given.
+        error: what to raise.
+        advice: what to give instead.
+
+    Raises:
+        PlanarmError: of the kind `error`.
+    """
+    try:
+        with Path(name).open("rb"):
+            pass
+    except OSError as cause:
+        raise error(f"{name}: cannot be read: {cause.strerror or cause}; {advice}") from cause
 
 
 def tell_first_compile(*packages: str) -> None:

@@ -8,11 +8,13 @@ from contextlib import closing
 from pathlib import Path
 
 from planarm.cli.progress import progress
-from planarm.cli.scenes import tell_first_compile
+from planarm.cli.scenes import require_file, tell_first_compile
+from planarm.errors import PlanFileError
 
 
 def execute(options: argparse.Namespace) -> int:
     """Stream a certified plan and tell what the device executed."""
+    require_file(options.plan, PlanFileError, "make a plan with 'planarm plan'")
     tell_first_compile("planarm", "planarm_sim")
     from planarm.link.position import moved_usteps
     from planarm.link.positions import Positions, default_path

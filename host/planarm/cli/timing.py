@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from planarm.cli.progress import progress
-from planarm.cli.scenes import tell_first_compile
-from planarm.errors import StepsDifferError, UsageError
+from planarm.cli.scenes import require_file, tell_first_compile
+from planarm.errors import CaptureError, StepsDifferError, UsageError
 from planarm.output import require_place, writing
 
 if TYPE_CHECKING:
@@ -18,9 +18,6 @@ if TYPE_CHECKING:
 
 def execute(options: argparse.Namespace) -> int:
     """Judge a recording, or one against another; exit code 7 when something is wrong."""
-    tell_first_compile("planarm")
-    from planarm.timing_flow import TimingRequest, compare_recordings, judge_recording
-
     names = [Path(name) for name in options.captures]
     is_diff = options.captures[0] == "diff" and len(names) > 1
     if len(names) != (3 if is_diff else 1):
@@ -29,6 +26,11 @@ def execute(options: argparse.Namespace) -> int:
         raise UsageError("diff holds one capture against the other; --plan goes with one capture")
     for place in filter(None, (options.junit, options.html)):
         require_place(Path(place))
+    for name in options.captures[int(is_diff) :]:
+        require_file(name, CaptureError, "give the path of a VCD, or of a CSV export of Saleae Logic 2 or sigrok")
+    tell_first_compile("planarm")
+    from planarm.timing_flow import TimingRequest, compare_recordings, judge_recording
+
     request = TimingRequest(
         capture=names[-1],
         plan=Path(options.plan) if options.plan else None,

@@ -41,7 +41,7 @@ HELLO_LATER_PAUSE_S = 1.25
 
 _HELLO_SEQ = 0
 _MODULO_256 = 0xFF
-_FLASH_IT = "flash the released image: pio run -d firmware -t upload"
+_FLASH_IT = "flash the released image: planarm flash --port DEVICE"
 
 
 @dataclass(frozen=True, slots=True)

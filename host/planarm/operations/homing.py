@@ -131,7 +131,9 @@ def _ready(transport: Transport, port: str, scene: Scene, positions: Positions) 
         raise SceneError(
             scene.source,
             "limit_switches",
-            f"joints {missing} have none" if missing else "homing is for motors that each move one joint",
+            f"joints {missing} have none; write one for each joint, or tell the place: 'planarm zero SCENE'"
+            if missing
+            else "homing is for motors that each move one joint; tell the place: 'planarm zero SCENE'",
         )
     session = open_session(transport)
     assert session.welcome is not None, "an open session has a welcome"

@@ -96,6 +96,8 @@ def _planner_words(plan: Plan) -> str:
     planner = plan.scene.planner
     if plan.joint is not None:
         return f"joint space, least {plan.joint.objective.replace('_', ' ')}"
+    if plan.moving is not None:
+        return f"in space and time, moves {planner.moves}"
     return f"{planner.algorithm} ({planner.neighbours}), moves {planner.moves}"
 
 

@@ -18,9 +18,9 @@ function certificateRow(check) {
   const advice = check.verdict === "green" ? "" : check.setting;
   return h("tr", { class: check.verdict },
     h("td", { class: `mark ${check.verdict}` }, glyph(check.verdict), h("b", {}, ` ${WORDS[check.verdict]}`)),
-    h("td", {}, check.name, h("span", { class: "code" }, check.code), h("span", { class: "sub" }, [check.where, advice && `change ${advice}`].filter(Boolean).join("; "))),
+    h("td", {}, check.name, h("span", { class: "code" }, check.code), h("span", { class: "sub" }, [`limit ${short(check.limit)}${unit}`, check.where, advice && `change ${advice}`].filter(Boolean).join("; "))),
     h("td", { class: "n" }, short(check.value), h("span", { class: "unit" }, unit)),
-    h("td", { class: "n" }, short(check.limit)),
+    h("td", { class: "n wide" }, short(check.limit)),
     h("td", { class: "wide" }, bar),
     h("td", { class: "wide quiet" }, check.where),
     h("td", { class: "wide" }, advice ? h("code", {}, advice) : ""));
@@ -38,7 +38,7 @@ function certificateTable(checks) {
     h("h2", {}, "Certificate", h("small", {}, `${checks.length} checks of the expanded segments, nearest to its limit first`), h("span", { class: "counts" }, ...counts)),
     h("div", { class: "scroll" }, h("table", {},
       h("thead", {}, h("tr", {},
-        ...[["verdict", ""], ["check", ""], ["value", "n"], ["limit", "n"], ["of the limit", "wide"], ["where", "wide"], ["change", "wide"]]
+        ...[["verdict", ""], ["check", ""], ["value", "n"], ["limit", "n wide"], ["of the limit", "wide"], ["where", "wide"], ["change", "wide"]]
           .map(([name, look]) => h("th", { scope: "col", class: look }, name)))),
       h("tbody", {}, ...sorted.map(certificateRow)))));
 }
@@ -48,6 +48,7 @@ const UNITS = { cm: "cm", mm: "mm", s: "s", ms: "ms", us: "µs", hz: "Hz", ticks
 function figureText(value, unit) {
   if (value === null || value === undefined) return "not measured";
   if (typeof value === "boolean") return value ? "yes" : "no";
+  if (Array.isArray(value) && !value.length) return "none";
   if (Array.isArray(value)) return value.map((one) => (typeof one === "object" ? Object.values(one).map(short).join(" ") : short(one))).join(" / ") + unit;
   return short(value) + unit;
 }

@@ -1,0 +1,75 @@
+"""The command line's parser: what it says of words that it does not know, and its help."""
+
+from itertools import chain
+
+import pytest
+
+from planarm.cli.main import build_parser, main
+from planarm.cli.parser import USES, meant
+
+ARM = "tests/scenarios/arm.toml"
+
+
+def told(words, capsys):
+    with pytest.raises(SystemExit) as left:
+        main(words)
+    return left.value.code, capsys.readouterr()
+
+
+def test_the_help_has_every_command_once():
+    listed = list(chain.from_iterable(USES.values()))
+    [choices] = [one.choices for one in build_parser()._actions if one.dest == "command"]
+    assert sorted(listed) == sorted(choices)
+    text = build_parser().format_help()
+    assert all(text.count(f"\n  {name} ") == 1 for name in listed)
+
+
+def test_without_words_the_help_is_told_and_it_is_no_success(capsys):
+    code, said = told([], capsys)
+    assert (code, said.out) == (2, "")
+    assert "plan and run:" in said.err and "exit codes:" in said.err
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["pln"], "there is no command 'pln'; did you mean plan?"),
+        (["xyzzy"], "there is no command 'xyzzy'; 'planarm --help'"),
+        (["run", ARM, "--planer", "chs"], "there is no option --planer; did you mean --planner?; 'planarm run --help'"),
+        (["run", ARM, "--prot=sim://"], "there is no option --prot; did you mean --port?"),
+        (["run", ARM, "--planner", "ch"], "'ch' is none of a_star, .*any_angle; did you mean chs?"),
+        (["run", ARM, "more"], "nothing takes 'more'; 'planarm run --help'"),
+        (["run", "--port"], "--port: expected one argument"),
+    ],
+)
+def test_what_was_meant_is_said(words, said, capsys):
+    code, out = told(words, capsys)
+    assert code == 2
+    head, _, tail = said.partition(".*")
+    assert head in out.err and tail in out.err
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["run", ARM, "--faults", "none.toml"], "none.toml: cannot be read: No such file or directory; give"),
+        (["run", ARM, "--out", ARM], f"{ARM}: cannot be written: "),
+        (["run", ARM, "--out", f"{ARM}/deeper"], "arm.toml is a file; give the path of a folder"),
+        (["stream", "none.plan"], "none.plan: cannot be read"),
+        (["timing", "none.vcd"], "give the path of a VCD"),
+        (["timing", "diff", ARM, "none.vcd"], "none.vcd: cannot be read"),
+        (["resume", "none"], "give the folder of a run"),
+        (["dump", ARM], "has no message in it"),
+    ],
+)
+def test_what_cannot_be_is_refused_before_anything_is_done(words, said, capsys, monkeypatch, pytestconfig):
+    monkeypatch.chdir(pytestconfig.rootpath)
+    for module in ("run.compile_first", "stream.tell_first_compile", "timing.tell_first_compile"):
+        monkeypatch.setattr(f"planarm.cli.{module}", lambda *_: pytest.fail("began"))
+    code, out = told(words, capsys)
+    assert code == 2
+    assert said in out.err
+
+
+def test_nothing_is_meant_where_nothing_is_near():
+    assert meant("zzzz", ["plan", "run"]) == ""
