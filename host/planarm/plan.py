@@ -42,13 +42,16 @@ class Plan:
     """How the motion among moving obstacles was found; None where obstacles rest."""
     bound_cm: float | None = None
     """No path of the tip on the map is shorter; None where the path was searched, or optimised, in joint space."""
+    note: str = ""
+    """In what the path is less than was asked for; empty when in nothing."""
 
-    def length_figures(self) -> dict[str, float | None]:
-        """The path's length, its proven lower bound, and by how many per cent the path can be longer than the best."""
+    def length_figures(self) -> dict[str, float | str | None]:
+        """The path's length, its proven lower bound, by how many per cent it can exceed the best, and the note."""
         length_cm, bound_cm = self.path.length_cm, self.bound_cm
         gap = None if not bound_cm else round(100.0 * max(0.0, length_cm / bound_cm - 1.0), 4)
         bound = None if not bound_cm else round(bound_cm, 6)
-        return {"path_length_cm": round(length_cm, 6), "path_bound_cm": bound, "path_gap_percent": gap}
+        figures = {"path_length_cm": round(length_cm, 6), "path_bound_cm": bound, "path_gap_percent": gap}
+        return {**figures, "path_note": self.note} if self.note else {**figures}
 
 
 @dataclass(frozen=True, slots=True)

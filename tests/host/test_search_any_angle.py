@@ -1,5 +1,6 @@
 """Any-angle paths: what is in sight, paths pulled taut, and the bound, on maps drawn in text and on maps of an arm."""
 
+from dataclasses import replace
 from math import hypot
 
 import numpy as np
@@ -123,3 +124,18 @@ def test_the_bound_is_infinite_only_without_any_chain():
     lattice = make_lattice(sealed, 6)
     row = 6 * lattice.width + 6
     assert lower_bound_cells(lattice, sealed.world, row, row + 13) == np.inf
+
+
+def test_where_the_optimum_is_not_known_the_answer_says_so():
+    """Points beside the nodes, moves checked at nodes alone, a map where too many nodes may lie on a shorter way."""
+    exact = planner("any_angle", 56, moves="proved")
+    scene = table1_scene(1)
+    free_map = build_free_map(scene)
+    assert find_path(free_map, (49.0, 2.0), (1.0, 45.0), exact).note == ""
+    assert "no node" in find_path(free_map, (48.9, 2.3), (1.0, 45.0), exact).note
+    assert "CHS" in find_path(free_map, (49.0, 2.0), (1.0, 45.0), planner("any_angle", 56, moves="nodes")).note
+    fine = build_free_map(replace(scene, workspace=replace(scene.workspace, cell_cm=0.1)))
+    found = find_path(fine, (49.0, 2.0), (1.0, 45.0), exact)
+    assert "20,000 nodes" in found.note
+    assert "workspace.cell_cm" in found.note
+    assert found.gap > 0.0

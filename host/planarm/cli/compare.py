@@ -19,10 +19,10 @@ if TYPE_CHECKING:
     from rich.console import Console
     from rich.table import Table
 
+    from planarm.experiments.notice import Notice
     from planarm.experiments.text_table import TextTable
 
 Result = TypeVar("Result")
-Notice = Callable[[str, float], None]
 
 BENCHMARK_SCENES = 1000
 SAVING_SCENES = 60
@@ -116,7 +116,8 @@ def _as_printed(options: argparse.Namespace) -> int:
 
     from planarm.experiments.as_printed import as_printed_tables, compare_as_printed
 
-    result = compare_as_printed()
+    with progress(options.json) as notice:
+        result = compare_as_printed(notice)
     if options.json:
         print(json.dumps(asdict(result)))
     else:

@@ -47,6 +47,8 @@ def execute(options: argparse.Namespace) -> int:
         warm_up(on_roadmap=scene.planner.on_roadmap, moving=scene.moving is not None)
         notice("kernels", 1.0)
         plan = plan_scene(scene, notice)
+        if plan.note:
+            notice.warn(plan.note)
     save_plan(stored(plan), target)
     rows = [asdict(check) for check in plan.certificate.checks]
     if not options.json:

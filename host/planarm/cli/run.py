@@ -72,4 +72,6 @@ def _print(summary: dict[str, object], out: Path) -> None:
 
     console = terminal()
     console.print(summary_table(summary))
+    if "path_note" in summary:
+        console.print(f"note: {summary['path_note']}", markup=False)
     console.print(f"report: {out / 'report.html'}; beside it plan, trace, summary and pictures", markup=False)

@@ -1,11 +1,13 @@
 """What the papers' printed forms do, beside the corrected ones: `planarm compare table2 --as-printed`."""
 
 from dataclasses import dataclass
+from itertools import product
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
+from planarm.experiments.notice import Notice, silent
 from planarm.experiments.printed import ArcTangent, forward_paper_b, inverse_paper_c, search_paper_c
 from planarm.experiments.published import A_STAR, CASES, CHS, MODIFIED, TABLE2, Planner
 from planarm.experiments.table2 import Case, load_case
@@ -54,12 +56,17 @@ class AsPrinted:
     searches: tuple[PrintedSearch, ...]
 
 
-def compare_as_printed() -> AsPrinted:
+def compare_as_printed(notice: Notice = silent) -> AsPrinted:
     """Run the printed equations and the printed search."""
-    return AsPrinted(
-        (_equation_9("printed"), _equation_9("atan2"), _equations_1_2()),
-        tuple(_search(case, planner) for case in map(load_case, CASES) for planner in (A_STAR, MODIFIED, CHS)),
-    )
+    notice("as printed", 0.0)
+    equations = _equation_9("printed"), _equation_9("atan2"), _equations_1_2()
+    runs = list(product(CASES, (A_STAR, MODIFIED, CHS)))
+    cases, searches = {case: load_case(case) for case in CASES}, list[PrintedSearch]()
+    for case, planner in runs:
+        notice("as printed", len(searches) / len(runs))
+        searches.append(_search(cases[case], planner))
+    notice("as printed", 1.0)
+    return AsPrinted(equations, tuple(searches))
 
 
 def as_printed_tables(result: AsPrinted) -> tuple[TextTable, ...]:

@@ -11,7 +11,6 @@ import shlex
 import subprocess
 import threading
 from collections import Counter
-from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
 from itertools import pairwise
@@ -26,6 +25,7 @@ from numpy.typing import NDArray
 from planarm.errors import SceneError
 from planarm.experiments.benchmark_scenes import benchmark_scene, problem, scene_hash
 from planarm.experiments.node_optimum import line_is_legal
+from planarm.experiments.notice import Notice, silent
 from planarm.experiments.scenes import example_file
 from planarm.experiments.text_table import TextTable, number
 from planarm.scene import Scene
@@ -36,8 +36,6 @@ Floats = NDArray[np.float64]
 DATA: Final = "open_benchmark.csv"
 ON_NODE_CM: Final = 1e-6
 """A way-point this near to a node is the node."""
-
-Notice = Callable[[str, float], None]
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,7 +98,7 @@ def read_optima() -> tuple[Optimum, ...]:
         return tuple(Optimum(row["hash"], float(row["optimum_cm"])) for row in csv.DictReader(file))
 
 
-def score_external(command: str, scenes: int, timeout_s: float, notice: Notice = lambda _stage, _share: None) -> Score:
+def score_external(command: str, scenes: int, timeout_s: float, notice: Notice = silent) -> Score:
     """Run a planner on the first scenes and judge its paths.
 
     Args:

@@ -15,6 +15,7 @@ from typing import Final, Literal
 import numpy as np
 
 from planarm.errors import SceneError
+from planarm.experiments.notice import Notice, silent
 from planarm.experiments.scenes import example_file
 from planarm.model.arm import Arm
 from planarm.scene import Scene, load_scene
@@ -29,7 +30,6 @@ ENVIRONMENTS: Final = (1, 2)
 REPEATS: Final = 7
 """Of which the median time is told, after one that is not counted."""
 
-Notice = Callable[[str, float], None]
 Way = Literal["plain", "modified", "exact"]
 
 
@@ -86,7 +86,7 @@ class Moving:
     seed: int
 
 
-def compare_moving(seed: int = 1, notice: Notice = lambda _stage, _share: None) -> Moving:
+def compare_moving(seed: int = 1, notice: Notice = silent) -> Moving:
     """Compute everything.
 
     Args:

@@ -8,9 +8,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from planarm.experiments.moving import Environment, Moving, Notice
+from planarm.experiments.moving import Environment, Moving
 from planarm.experiments.moving_published import PUBLISHED
 from planarm.experiments.moving_tables import as_json, as_markdown
+from planarm.experiments.notice import Notice, silent
 from planarm.model.arm import Arm
 from planarm.model.kinematics import ElbowSide, forward
 from planarm.model.moving import offset_cm, shape_at
@@ -27,7 +28,7 @@ ANIMATION_STEPS = 4
 """Poses of an animation for each motion sample."""
 
 
-def write_moving(result: Moving, out: Path, notice: Notice = lambda _stage, _share: None) -> list[Path]:
+def write_moving(result: Moving, out: Path, notice: Notice = silent) -> list[Path]:
     """Write everything and return the files; those of an earlier comparison are overwritten."""
     out.mkdir(parents=True, exist_ok=True)
     files = [out / "moving.json", out / "moving.md"]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from itertools import pairwise
 from pathlib import Path
@@ -23,14 +22,13 @@ from planarm.experiments.mpdstar_cases import (
 )
 from planarm.experiments.mpdstar_growth import PUBLISHED, SIZES, GrowthRow, Saving, growth, savings
 from planarm.experiments.mpdstar_scenes import ASSUMPTIONS, CASES
+from planarm.experiments.notice import Notice
 from planarm.experiments.text_table import TextTable, number
 from planarm.model.arm import Arm
 from planarm.model.kinematics import forward
 from planarm.model.shapes import shape_of
 from planarm.report.roadmap import draw_energies, draw_growth, draw_savings, draw_way
 from planarm.search.incremental import GraphAlgorithm
-
-Notice = Callable[[str, float], None]
 
 NAMES: Final[dict[GraphAlgorithm, str]] = {
     "mpd_star_lite": "MPD* Lite",

@@ -6,9 +6,9 @@ reading (only nodes are checked) and with every move proved free, on the same ma
 seeds; where one figure has to stand for it, it is the median of the seeds that find a path.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise
+from itertools import pairwise, product
 from math import nan
 from statistics import median
 from time import perf_counter
@@ -16,6 +16,7 @@ from typing import Final, Literal
 
 import numpy as np
 
+from planarm.experiments.notice import Notice, silent
 from planarm.experiments.published import A_STAR, CASES, CHAOS, PLANNERS, TABLE2, Figures, Planner
 from planarm.experiments.scenes import table1_scene
 from planarm.model.arm import Arm
@@ -40,8 +41,6 @@ SUBSETS: Final[tuple[Subset, ...]] = ("run", "expansion")
 QUANTITIES: Final[tuple[Quantity, ...]] = ("length", "time")
 CHAOS_SIZES: Final = tuple(replace(CHAOS, neighbours=neighbours) for neighbours in sorted(DRAWN))
 """Paper C, fig. 6: 5 of 8, 12 of 20, 23 of 44 and 34 of 68."""
-
-Notice = Callable[[str, float], None]
 
 
 @dataclass(frozen=True, slots=True)
@@ -163,7 +162,7 @@ class Case:
         return find_path(self.free_map, self.scene.task.start_cm, self.scene.task.goal_cm, spec)
 
 
-def compare_table2(seeds: int = SEEDS, notice: Notice = lambda _stage, _share: None) -> Table2:
+def compare_table2(seeds: int = SEEDS, notice: Notice = silent) -> Table2:
     """Compute the whole comparison; Chaos A* runs with seeds 0 .. seeds - 1.
 
     Raises:
@@ -178,12 +177,11 @@ def compare_table2(seeds: int = SEEDS, notice: Notice = lambda _stage, _share: N
         case = load_case(number)
         world = case.free_map
         maps.append(MapFigures(number, world.free_nodes, world.margin_cm, world.cell_cm, case.build_ms))
-        spread = [
-            _scatter(case, planner, moves, subset, seeds)
-            for planner in CHAOS_SIZES
-            for moves in READINGS
-            for subset in SUBSETS
-        ]
+        spread = []
+        kinds = list(product(CHAOS_SIZES, READINGS, SUBSETS))
+        for k, (planner, moves, subset) in enumerate(kinds):
+            spread.append(_scatter(case, planner, moves, subset, seeds))
+            notice("compare", (done + (k + 1) / len(kinds)) / len(CASES))
         rows += [_row(case, planner, spread) for planner in PLANNERS]
         scatter += spread
     notice("compare", 1.0)

@@ -5,13 +5,14 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+from planarm.experiments.notice import Notice, silent
 from planarm.experiments.pictures import draw_angles, draw_free_space, draw_paper_stencils, draw_path
 from planarm.experiments.published import CASES, CHAOS, PLANNERS, Planner
-from planarm.experiments.table2 import Case, Notice, Table2, load_case, typical_path
+from planarm.experiments.table2 import Case, Table2, load_case, typical_path
 from planarm.experiments.table2_tables import as_json, as_markdown
 
 
-def write_table2(result: Table2, out: Path, notice: Notice = lambda _stage, _share: None) -> list[Path]:
+def write_table2(result: Table2, out: Path, notice: Notice = silent) -> list[Path]:
     """Write everything and return the files; those of an earlier comparison are overwritten.
 
     The paths are those of the paper's reading (figs. 11, 13, 15, 17), the joint angles those of a motion along them

@@ -16,7 +16,7 @@ from planarm.search.diagnosis import Diagnosis, diagnose, diagnose_joints
 from planarm.search.grid_search import find_path
 from planarm.search.joint_space import SIDES, JointRoute, find_joint_route, made_route, tip_points_cm
 from planarm.search.path import Path
-from planarm.search.result import SearchStatus
+from planarm.search.result import SearchResult, SearchStatus
 from planarm.smoothing.joint_blend import blend_poses
 from planarm.smoothing.smooth import smooth_path
 from planarm.smoothing.smooth_path import Floats, SmoothPath
@@ -40,6 +40,8 @@ class Route:
     """The way-points of a route in joint space."""
     bound_cm: float | None = None
     """No path of the tip on the allowed sides' maps is shorter (docs/planners.md); None in joint space."""
+    note: str = ""
+    """In what the path is less than was asked for; empty when in nothing."""
 
 
 def find_route(scene: Scene, margin_cm: float) -> Route:
@@ -61,7 +63,7 @@ def find_route(scene: Scene, margin_cm: float) -> Route:
 
 def tip_route(scene: Scene, margin_cm: float) -> Route:
     """Return the route along the shortest path of the tip on any allowed elbow side; errors as `find_route`."""
-    found: list[tuple[FreeMap, Path, float, float]] = []
+    found: list[tuple[FreeMap, Path, SearchResult, float]] = []
     bounds_cm = []
     price = search_price(scene)
     for side in elbow_sides(scene.arm):
@@ -73,12 +75,13 @@ def tip_route(scene: Scene, margin_cm: float) -> Route:
         result = find_path(free_map, scene.task.start_cm, scene.task.goal_cm, scene.planner, price)
         if result.path is not None:
             cost = result.path.length_cm if result.cost is None else result.cost
-            found.append((free_map, result.path, result.plan_s, cost))
+            found.append((free_map, result.path, result, cost))
             bounds_cm.append(result.bound_cm)
     if not found:
         raise no_path(scene, diagnose(scene, margin_cm))
-    free_map, path, search_s, _ = min(found, key=lambda one: one[3])
-    return Route(free_map, path, smoothed(scene, free_map, path), search_s, bound_cm=min(bounds_cm))
+    free_map, path, result, _ = min(found, key=lambda one: one[3])
+    smooth = smoothed(scene, free_map, path)
+    return Route(free_map, path, smooth, result.plan_s, bound_cm=min(bounds_cm), note=result.note)
 
 
 def search_price(scene: Scene) -> Price | None:

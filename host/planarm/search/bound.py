@@ -20,12 +20,19 @@ SMALL_MAP: Final = 5_000
 NEAR_OPTIMAL: Final = ("taut", "any_angle")
 """Planners whose paths are short enough that the optimum is found fast from them."""
 
+_INEXACT: Final = "This path, pulled taut, is not known to be the exact any-angle optimum"
+_CELL: Final = "workspace.cell_cm"
+
 ASIDE: Final = JOIN_CELLS + 3
 """Rows and columns by which a leg from a point that is no node may lie beside one from the node it is joined to."""
 
 
-def optimal_path(free_map: FreeMap, path: Path, start: Endpoint, goal: Endpoint, planner: PlannerSpec) -> Path | None:
-    """Return the shortest chain of legs in sight between the nodes of start and goal; None keeps `path`.
+def optimal_path(
+    free_map: FreeMap, path: Path, start: Endpoint, goal: Endpoint, planner: PlannerSpec
+) -> tuple[Path, str]:
+    """Return the shortest chain of legs in sight between the nodes of start and goal, and a note where it is not known.
+
+    The known path is returned where it is the shortest, and where the note says why no answer was looked for.
 
     Args:
         free_map: where to look.
@@ -34,11 +41,18 @@ def optimal_path(free_map: FreeMap, path: Path, start: Endpoint, goal: Endpoint,
         goal: where it ends.
         planner: moves "cells" or "proved".
     """
-    if not (start.on_node and goal.on_node) or len(path.points_cm) == 1:
-        return None
+    if len(path.points_cm) == 1:
+        return path, ""
+    if not (start.on_node and goal.on_node):
+        return (
+            path,
+            f"{_INEXACT}: start or goal is no node; put both on multiples of {_CELL}.",
+        )
     lattice = make_lattice(free_map, BORDER)
     nodes = _better(lattice, free_map, path, (start, goal), planner, MOST_ASKED)
-    return None if nodes is None or not len(nodes) else Path.through(nodes_cm(lattice, nodes), free_map.elbow)
+    if nodes is None:
+        return path, f"{_INEXACT}: a shorter one may pass more than {MOST_ASKED:,} nodes; take a larger {_CELL}."
+    return (Path.through(nodes_cm(lattice, nodes), free_map.elbow) if len(nodes) else path), ""
 
 
 def path_bound_cm(free_map: FreeMap, path: Path, start: Endpoint, goal: Endpoint, planner: PlannerSpec) -> float:

@@ -42,6 +42,11 @@ PULLED: Final = ("taut", "any_angle")
 THETA: Final = ("theta_star", "lazy_theta_star")
 PRICED: Final = ("a_star", "modified_a_star", "chs", "taut", "any_angle")
 """Algorithms that can search by another price than length: those that use a whole stencil."""
+NO_OPTIMUM: Final = (
+    "This path is CHS's: an exact any-angle optimum is one of length, over moves that are checked all along "
+    '(planner.objective = "length", planner.moves = "proved" or "cells").'
+)
+
 FEW_MOVES: Final = 8
 """With no more moves than this the search looks itself for where not all have to be tried."""
 
@@ -79,11 +84,15 @@ def find_path(
     path = _path(free_map, lattice, found, start, goal)
     if planner.algorithm in PULLED and planner.moves != "nodes" and not priced:
         path = _pulled(free_map, lattice, path, planner)
-    if planner.algorithm == "any_angle" and planner.moves != "nodes" and not priced:
-        path = optimal_path(free_map, path, start, goal, planner) or path
+    note = ""
+    if planner.algorithm == "any_angle":
+        if planner.moves == "nodes" or priced:
+            note = NO_OPTIMUM
+        else:
+            path, note = optimal_path(free_map, path, start, goal, planner)
     took_s = perf_counter() - begin_s
     bound_cm = path_bound_cm(free_map, path, start, goal, planner)
-    return SearchResult(SearchStatus.FOUND, "", path, found.expanded, found.generated, took_s, bound_cm, cost)
+    return SearchResult(SearchStatus.FOUND, "", path, found.expanded, found.generated, took_s, bound_cm, cost, note)
 
 
 def _search_priced(

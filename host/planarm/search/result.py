@@ -36,6 +36,9 @@ class SearchResult:
     cost: float | None = None
     """Where the objective is not the length: sum over the moves, rad of joint travel or s at the joints' top speeds."""
 
+    note: str = ""
+    """A sentence that says in what the path is less than was asked for; empty when in nothing."""
+
     @property
     def gap(self) -> float:
         """By what share the path is longer than the bound: no path is better by more."""
