@@ -7,13 +7,16 @@ import numpy as np
 import pytest
 
 from broken_runs import SCENE, board
+from link_model import motion
 from planarm.cli.main import main
 from planarm.errors import LinkError, NoPathError, UsageError
+from planarm.link.exchange import open_session, request
 from planarm.link.positions import Positions
 from planarm.operations.arm_moves import goto, jog
 from planarm.plan_file import arm_hash
 from planarm.scene import load_scene
 from planarm.streaming.standing import look, pose_of, require_standing, tell, usteps_at
+from planarm_wire.messages import Enable, Segments
 
 PORT = "/dev/ttyUNO"
 
@@ -50,6 +53,20 @@ def test_a_board_that_was_told_nothing_is_refused_until_it_is(scene, positions):
     line.uno.reset()
     line.clock.wait_until(line.clock.now_s() + 0.1)
     assert look(line, PORT, scene, positions).how is None, "another boot knows nothing"
+
+
+@pytest.mark.parametrize("faulted", [False, True])
+def test_zero_drops_what_a_program_that_died_has_left_in_the_queue(scene, positions, faulted):
+    line, start = board(), usteps_at(scene, scene.task.start_cm)
+    session = open_session(line)
+    request(line, session, Enable(1))
+    for _ in range(1 + faulted):  # segments after a motion's last are a fault
+        session.send(Segments(0, 0, 0, motion(1)), line.clock.now_s())
+        line.clock.wait_until(line.clock.now_s() + 0.01)
+        line.read(4096, 0.0)
+    tell(line, PORT, scene, positions, start, "zeroed")
+    standing = look(line, PORT, scene, positions)
+    assert (standing.usteps, standing.how) == (start, "zeroed")
 
 
 def test_goto_goes_to_the_point_and_back(scene, positions):

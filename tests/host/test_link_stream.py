@@ -541,9 +541,11 @@ def test_the_remaining_time_is_the_walls_and_honest():
     for at_s, left_s in late:
         assert left_s == pytest.approx(3.0 * (end_s - at_s), abs=0.2)
     then = Span(1.0, 1.0)
-    progress = StreamProgress(1.0, 2.0, 5, 10, 5, (0, 0), State.HELD, 1.0, 800, 0, 0, then, then)
+    progress = StreamProgress(1.0, 2.0, 5, 10, 5, 0.25, (0, 0), State.HELD, 1.0, 800, 0, 0, then, then)
     assert remaining.after(progress) is None
-    assert words_of(progress, None) == "1.00 of 2.00 s, 5 segments queued, the arm stands (held)"
+    assert words_of(progress, None) == "1.00 of 2.00 s, 0.25 s queued, the arm stands (held)"
     slow = replace(progress, state=State.RUNNING, rate_percent=50)
     assert remaining.after(slow) > 1.9
-    assert words_of(slow, 2.0) == "1.00 of 2.00 s, 5 segments queued, at 50 %, about 2.0 s left"
+    assert words_of(slow, 2.0) == "1.00 of 2.00 s, 0.25 s queued, at 50 %, about 2.0 s left"
+    assert words_of(slow, 2.0, short=True) == "0.2 s queued, at 50 %, 2 s left"
+    assert words_of(progress, None, short=True) == "0.2 s queued, held"

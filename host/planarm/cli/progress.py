@@ -77,19 +77,24 @@ class Lines(Shown):
             print(f"{stage}: {25 * quarter} %{more}", file=sys.stderr, flush=True)
 
 
+NARROW_COLUMNS = 76
+"""Below it there is no room for a bar beside all that a motion tells."""
+
+
 @contextmanager
 def _bar() -> Iterator[Shown]:
     from rich.console import Console
-    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+    from rich.progress import BarColumn, Progress, TextColumn
+    from rich.table import Column
 
+    whole = Column(no_wrap=True)
     columns = (
-        TextColumn("{task.description:>10}"),
-        BarColumn(),
-        TextColumn("{task.percentage:3.0f} %"),
-        TimeElapsedColumn(),
-        TextColumn("{task.fields[words]}"),
+        TextColumn("{task.description:>7}", table_column=whole),
+        BarColumn(bar_width=None, table_column=Column(ratio=1)),
+        TextColumn("{task.percentage:3.0f} %", table_column=whole),
+        TextColumn("{task.fields[words]}", table_column=whole),
     )
-    with Progress(*columns, console=Console(stderr=True)) as bar:
+    with Progress(*columns, console=Console(stderr=True), expand=True) as bar:
         yield Bar(bar)
 
 
@@ -110,7 +115,7 @@ class Bar(Shown):
         from planarm.link.remaining import Remaining, words_of
 
         self._remaining = self._remaining or Remaining(time.monotonic)
-        words = words_of(told, self._remaining.after(told))
+        words = words_of(told, self._remaining.after(told), short=self._bar.console.width < NARROW_COLUMNS)
         self._bar.update(self._task(STREAM), completed=told.path_s / told.total_s, words=words)
 
     def warn(self, text: str) -> None:

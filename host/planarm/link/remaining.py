@@ -32,8 +32,11 @@ class Remaining:
         return left_s * PERCENT / told.rate_percent * pace
 
 
-def words_of(told: StreamProgress, left_s: float | None) -> str:
-    """Return path time, buffer depth and remaining time in words."""
-    left = f"the arm stands ({told.state.name.lower()})" if left_s is None else f"about {left_s:.1f} s left"
+def words_of(told: StreamProgress, left_s: float | None, *, short: bool = False) -> str:
+    """Return path time, that of what the device holds, and remaining time in words; `short` leaves out the first."""
     rate = "" if told.rate_percent in (0, PERCENT) else f", at {told.rate_percent} %"
-    return f"{told.path_s:.2f} of {told.total_s:.2f} s, {told.queued_segments} segments queued{rate}, {left}"
+    if short:
+        left = told.state.name.lower() if left_s is None else f"{left_s:.0f} s left"
+        return f"{told.queued_s:.1f} s queued{rate}, {left}"
+    left = f"the arm stands ({told.state.name.lower()})" if left_s is None else f"about {left_s:.1f} s left"
+    return f"{told.path_s:.2f} of {told.total_s:.2f} s, {told.queued_s:.2f} s queued{rate}, {left}"

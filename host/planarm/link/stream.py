@@ -382,6 +382,7 @@ class Stream:
             executed_segments=self._executed,
             total_segments=len(self._segments),
             queued_segments=self.sent_segments - self._executed,
+            queued_s=(self._ends_ticks[self.sent_segments] - self._ends_ticks[self._executed]) / TICKS_HZ,
             moved_usteps=moved,
             state=status.state,
             at_s=now_s,

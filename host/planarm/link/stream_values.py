@@ -45,6 +45,8 @@ class StreamProgress:
     total_segments: int
     queued_segments: int
     """Segments sent and not yet executed."""
+    queued_s: float
+    """Their path time."""
     moved_usteps: tuple[int, ...]
     """Signed micro-steps of each joint since the start, those of the running segment included."""
     state: State

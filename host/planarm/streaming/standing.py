@@ -21,7 +21,7 @@ from planarm.model.kinematics import forward, inverse_2r
 from planarm.model.transmission import Transmission
 from planarm.plan_file import arm_hash
 from planarm.scene import Scene
-from planarm_wire.messages import Query, SetPosition
+from planarm_wire.messages import QUEUE_BYTES, QUEUE_FRAME_BYTES, Clear, Query, SetPosition, State
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,10 +58,16 @@ def tell(
 ) -> None:
     """Tell a board at rest where its arm is, and note that it knows.
 
+    What a program that died while it filled the queue has left there is dropped, and a latched fault is cleared.
+
     Raises:
         LinkError, DeviceFault: it does not take it.
     """
     session = open_session(transport)
+    status = request(transport, session, Query())
+    left_behind = status.state is State.READY and status.free_bytes < QUEUE_BYTES - QUEUE_FRAME_BYTES
+    if left_behind or status.state is State.FAULT:
+        request(transport, session, Clear())
     request(transport, session, SetPosition(usteps))
     assert session.welcome is not None, "an open session has a welcome"
     positions.remember(port, session.welcome.boot_nonce, arm_hash(asdict(scene)), how)
