@@ -60,7 +60,7 @@ def _rebuilt(implementation: Any, target_context: Any, saved: Any) -> object:  #
         case _:
             return implementation.rebuild(target_context, saved)
     codegen = target_context.codegen()
-    symbols = _symbols(codegen, description)
+    symbols = _symbols(codegen, description, machine_code)
     if symbols is None:
         return implementation.rebuild(target_context, saved)
     known, own = symbols
@@ -72,15 +72,19 @@ def _rebuilt(implementation: Any, target_context: Any, saved: Any) -> object:  #
     return result
 
 
-def _symbols(codegen: Any, description: Any) -> tuple[set[str], set[str]] | None:  # noqa: ANN401
-    """Return the names that Numba's engine knows, and those by which it looks for a function; None: not this Numba."""
+def _symbols(codegen: Any, description: Any, machine_code: bytes) -> tuple[set[str], set[str]] | None:  # noqa: ANN401
+    """Return the names that Numba's engine knows, and those in the code by which it looks for a function.
+
+    A function that is for others alone has no way in from Python. None: not this Numba.
+    """
     known = getattr(getattr(codegen, "_engine", None), "_defined_symbols", None)
     names = ("llvm_func_name", "llvm_cpython_wrapper_name", "env_name")
     if not isinstance(known, set) or not all(hasattr(description, name) for name in names):
         return None
     if not hasattr(codegen._library_class, "_get_module_for_linking"):
         return None
-    return known, {getattr(description, name) for name in names}
+    sought = {str(getattr(description, name)) for name in names}
+    return known, {name for name in sought if name.encode() in machine_code}
 
 
 def _read_when_linked(library: Any, known: set[str], bitcode: bytes) -> None:  # noqa: ANN401
