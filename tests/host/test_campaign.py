@@ -161,6 +161,22 @@ def test_ctrl_c_ends_with_130_and_keeps_what_finished(tmp_path):
     assert f"{100_000 - len(found)} runs are missing, --resume goes on with them" in told
 
 
+def test_ctrl_c_while_workers_start_is_one_sentence(tmp_path):
+    written(tmp_path, 'kind = "self-test"\nscenes = ["scene.toml"]\n[vary]\nseed = { count = 100_000 }\n')
+    command = [str(Path(sys.executable).with_name("planarm")), "campaign", "campaign.toml", "--out", "out"]
+    with subprocess.Popen(
+        [*command, "--workers", "2"], cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+        start_new_session=True,
+    ) as process:  # fmt: skip
+        assert process.stderr is not None
+        assert any(line.startswith("0 of") for line in process.stderr)
+        os.killpg(process.pid, signal.SIGINT)
+        _, said = process.communicate(timeout=60)
+    assert process.returncode == 130
+    assert "Traceback" not in said
+    assert "stopped by the keyboard" in said or "of 100000" in said
+
+
 def test_settings_go_into_the_scene_and_wrong_ones_are_told(tmp_path):
     scene = SceneText("scene.toml", (EXAMPLES / "table1_case1.toml").read_text())
     changed = scene_of(scene, {"planner.seed": 7, "workspace.cell_cm": 0.5, "joints.2.gear_ratio": 4, "seed": 1})

@@ -16,7 +16,7 @@ from concurrent.futures.process import BrokenProcessPool
 from typing import Protocol, TypeAlias
 
 from planarm.campaign.task import Batch, Row
-from planarm.campaign.worker import failed_row, leave_ctrl_c_to_parent, run_batch_alone
+from planarm.campaign.worker import failed_row, leave_ctrl_c_to_parent, run_batch_alone, started_deaf_to_ctrl_c
 
 WAITING_BATCHES = 2
 """Batches handed out ahead for each worker, so that none waits for its next."""
@@ -74,7 +74,8 @@ class LocalEngine:
                     exhausted = True
                 else:
                     try:
-                        running[pool.submit(run_batch_alone, batch)] = batch
+                        with started_deaf_to_ctrl_c():
+                            running[pool.submit(run_batch_alone, batch)] = batch
                     except BrokenProcessPool:
                         again.append(batch)
                         raise _WorkerDied(list(running.values())) from None
@@ -95,7 +96,9 @@ class LocalEngine:
             pool = self._pool(1)
             began_s = time.monotonic()
             try:
-                rows = pool.submit(run_batch_alone, single).result()
+                with started_deaf_to_ctrl_c():
+                    future = pool.submit(run_batch_alone, single)
+                rows = future.result()
             except BrokenProcessPool:
                 rows = [failed_row(single, why_died(time.monotonic() - began_s, batch.limits.task_s))]
             finally:

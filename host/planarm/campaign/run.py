@@ -61,6 +61,8 @@ def run_campaign(
                 verdicts.update(row.verdict for row in rows)
                 on_progress(_progress(verdicts.total(), len(done), campaign.size, time.monotonic() - began_s))
         except KeyboardInterrupt:
+            if not (verdicts or done):  # there is nothing to keep or to tell of
+                raise
             stopped = True
     table = store.join()
     return Outcome(dict(verdicts), len(done), table, not stopped, time.monotonic() - began_s)

@@ -7,6 +7,8 @@ import signal
 import sys
 import threading
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 
 from planarm.campaign.self_test import run_self_test
 from planarm.campaign.task import Batch, Figures, Row, Task, task_key
@@ -69,3 +71,16 @@ def _limit_memory(memory_mb: int) -> None:
         size = memory_mb << 20
         _, hard = resource.getrlimit(resource.RLIMIT_AS)
         resource.setrlimit(resource.RLIMIT_AS, (size, hard))
+
+
+@contextmanager
+def started_deaf_to_ctrl_c() -> Iterator[None]:
+    """Start processes that ignore Ctrl-C from their first instruction on, also while they import."""
+    if threading.current_thread() is not threading.main_thread():  # which alone may say what becomes of a signal
+        yield
+        return
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)

@@ -20,7 +20,7 @@ function readouts(record) {
     ["Motion", known(summary.motion_s, 3, "s"), summary.motion_full_acceleration_s === undefined ? "" : `${num(summary.motion_full_acceleration_s, 3)} s with all acceleration`],
     ["Steps at the pins", summary.steps_at_pins ? joined(summary.steps_at_pins) : "–", `planned ${joined(summary.steps_planned)}`],
     ["Worst step", known(summary.max_step_timing_error_ticks, 0, "ticks"), summary.max_step_timing_error_ticks === null ? "other steps than planned" : "of 62.5 ns off its schedule"],
-    ["Tip at the goal, by the steps", known(summary.tip_error_mm, 3, "mm"), summary.tip_bound_mm === undefined ? "" : `half steps allow ${num(summary.tip_bound_mm, 3)} mm`],
+    ["Tip at the goal", known(summary.tip_error_mm, 3, "mm"), summary.tip_bound_mm === undefined ? "" : `by the steps; half a step allows ${num(summary.tip_bound_mm, 3)} mm`],
     ["Arm off the plan", known(summary.arm_max_tip_error_mm, 3, "mm"), summary.arm_max_tip_error_at_s === undefined ? "no arm was seen" : `largest, at ${num(summary.arm_max_tip_error_at_s, 3)} s`],
     ["Work of the joints", known(planned.work_mj.at(-1), 1, "mJ"), `motors heat with ${num(planned.copper_w, 1)} W`],
     ["On the line", known(summary.bytes_sent, 0, "bytes"), summary.retransmissions === undefined ? "" : `${num(summary.retransmissions)} sent again`],
