@@ -9,6 +9,7 @@ import time
 from collections.abc import Callable, Sequence
 from contextlib import closing
 from dataclasses import asdict, dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -48,7 +49,7 @@ from planarm.stepping.certify import certify
 from planarm.stepping.quantise import quantisation_bound_cm
 from planarm.stepping.schedule import encode, schedule
 from planarm.stepping.segments import SegmentPlan, expand
-from planarm.stepping.slowing import SpeedLimit
+from planarm.stepping.slowing import SpeedLimit, road_ticks
 from planarm.streaming.moving_run import KeptTime, Timekeeper, stream_on_time
 from planarm.streaming.plan_stream import options_for, record, stream, warn_of_release
 from planarm.streaming.standing import settle_start
@@ -57,7 +58,7 @@ from planarm.trajectory.limits import Limits
 from planarm.trajectory.motion import Trajectory
 from planarm.trajectory.timing import fastest_motion
 from planarm.workspace.free_map import build_free_map
-from planarm_wire.messages import DIR_PINS, STEP_PINS
+from planarm_wire.messages import DIR_PINS, STEP_PINS, TICKS_HZ
 
 Notice = Callable[[str, float], None]
 """Told the stage and the share of it that is done."""
@@ -208,14 +209,19 @@ def timed(scene: Scene, fastest: Trajectory, limits: Limits, limit: SpeedLimit |
 
 
 def optimised(scene: Scene, margin_cm: float, known: Trajectory, limits: Limits, notice: Notice) -> Trajectory:
-    """Optimise the path itself for duration; return the known motion when no faster one is found within the budget."""
+    """Optimise the path itself for duration; return the known motion when no faster one is found within the budget.
+
+    Both are compared as they will be executed, slowed down where a stop does not fit (docs/decisions/0107).
+    """
+    road_s = road_ticks(encode(scene, known)[1]) / TICKS_HZ
     spline = fastest_path(
-        scene, margin_cm, known.path, limits, time.perf_counter, lambda share, _best_s: notice("optimise", share)
+        scene, margin_cm, known.path, limits, road_s, time.perf_counter, lambda share, _s: notice("optimise", share)
     )
     notice("optimise", 1.0)
     if spline is None:
         return known
-    return min(known, fastest_motion(spline, limits), key=lambda motion: motion.duration_s)
+    motions = known, fastest_motion(spline, limits)
+    return min(motions, key=lambda motion: schedule(scene, partial(timed, scene, motion, limits))[0].duration_s)
 
 
 def tip_curve_cm(trajectory: Trajectory, arm: Arm) -> NDArray[np.float64]:

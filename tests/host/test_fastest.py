@@ -80,6 +80,8 @@ def problem_of(scene, controls, extra_cm=0.0):
         limits.accelerations_rad_s2,
         task.box_cm,
         extra_cm,
+        limits.accelerations_rad_s2 / limits.share,
+        np.inf,
     )
 
 

@@ -1,9 +1,9 @@
 """What a spline costs: its duration under speed and acceleration, and seconds for coming too near to anything.
 
-The duration is that of the time-optimal motion on a coarse grid, good to about a hundredth, which is all that a
-comparison of splines needs. Clearance, joint limits and the tip's rectangle are looked at on the same grid; the price
-for what is missing is exact: high enough that the best spline under it keeps all of them. What the optimiser hands out
-is proved and timed anew.
+The duration is that of the time-optimal motion on a coarse grid, slowed down where a stop would not fit, good to
+about a hundredth, which is all that a comparison of splines needs. Clearance, joint limits and the tip's rectangle
+are looked at on the same grid; the price for what is missing is exact: high enough that the best spline under it
+keeps all of them. What the optimiser hands out is proved and timed anew.
 """
 
 from math import inf
@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from planarm.fastest.stops import slowed_duration_s
 from planarm.smoothing.smooth_path import Floats
 from planarm.trajectory.topp import fastest_squared_speeds
 from planarm.workspace.joint_proof import JointWorld, link_ends, link_spare
@@ -42,6 +43,10 @@ class Problem(NamedTuple):
     """Least and greatest x and y of the tip, shape (4,)."""
     extra_cm: float
     """Clearance wanted at gridpoints beyond the margin, for what lies between them."""
+    stopping_rad_s2: Floats
+    """All of each joint's acceleration, for stops."""
+    road_s: float
+    """Path time within which every stop has to end; infinite when stops need not fit."""
 
 
 @kernel
@@ -137,6 +142,8 @@ def _duration_s(problem: Problem, dq: Floats, ddq: Floats, planes: Floats, bound
             planes[i, row + 2, 0], planes[i, row + 2, 1] = -a, b + a
             planes[i, row + 3, 0], planes[i, row + 3, 1] = a, -b - a
     x = fastest_squared_speeds(planes, bounds, limits)
+    if problem.road_s < inf:
+        return min(IMPOSSIBLE_S, slowed_duration_s(dq, ddq, x, h, problem.stopping_rad_s2, problem.road_s))
     duration = 0.0
     for i in range(count - 1):
         both = np.sqrt(x[i]) + np.sqrt(x[i + 1])

@@ -62,6 +62,8 @@ class Task:
     """Pairs of poses at start and goal; more than one when the elbow may be on either side."""
     box_cm: Floats
     """Least and greatest x and y of the tip, shape (4,)."""
+    road_s: float = np.inf
+    """Path time within which every stop has to end: what the device's queue holds; infinite when stops need not fit."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -207,6 +209,8 @@ class _Search:
             limits.accelerations_rad_s2,
             self.task.box_cm,
             EXTRA_CM[self.extra],
+            limits.accelerations_rad_s2 / limits.share,
+            self.task.road_s,
         )
 
     def _share(self) -> float:

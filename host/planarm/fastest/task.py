@@ -1,6 +1,7 @@
 """From a scene to the optimiser's task: its arm, its room, and the poses at start and goal."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -50,7 +51,7 @@ def _one_sided(world: JointWorld, sides: Sequence[str]) -> JointWorld:
 
 
 def fastest_path(
-    scene: Scene, margin_cm: float, known: SmoothPath, limits: Limits, clock: Clock, told: Told
+    scene: Scene, margin_cm: float, known: SmoothPath, limits: Limits, road_s: float, clock: Clock, told: Told
 ) -> JointSpline | None:
     """Return the fastest path found within the scene's budget; None when none was proved free.
 
@@ -59,10 +60,11 @@ def fastest_path(
         margin_cm: least distance of a link's centre line to an obstacle.
         known: a path from start to goal, as one of the starts.
         limits: what the joints can; speeds and accelerations are optimised for, torque is left to the timing.
+        road_s: path time within which every stop has to end.
         clock: for the budget.
         told: told the share of the budget used and the best duration.
     """
-    task = scene_task(scene, margin_cm, limits)
+    task = replace(scene_task(scene, margin_cm, limits), road_s=road_s)
     s = np.linspace(known.borders_s[0], known.borders_s[-1], POSES_OF_A_PATH)
     way: Floats = known.evaluate(s).q_rad
     return find_fastest(task, [way], Budget(scene.planner.budget_s), scene.planner.seed, clock, told)

@@ -84,6 +84,16 @@ def missing_road_ticks(plan: SegmentPlan) -> float | None:
     return float((held_until(table.starts, segment_bytes(table)) - last_slices(table))[lacking].mean())
 
 
+def road_ticks(plan: SegmentPlan) -> float:
+    """Return the path time that a stop may take in a plan like this, on average; infinite where all of it is held."""
+    table = table_of(plan)
+    held = held_until(table.starts, segment_bytes(table))
+    partly = held < table.starts[-1]
+    if not partly.any():
+        return float("inf")
+    return max(float(SLICE_TICKS), float((held - last_slices(table))[partly].mean()) - LINK_MARGIN_TICKS)
+
+
 def slower(trajectory: Trajectory, scene: Scene, road_ticks: float, before: SpeedLimit | None) -> SpeedLimit | None:
     """Return a lower limit of the speed where a stop takes more than a road of this length; None where none does.
 
