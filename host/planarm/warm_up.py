@@ -16,6 +16,8 @@ from planarm.link.transport import open_transport
 from planarm.model.arm import Arm
 from planarm.model.kinematics import forward
 from planarm.model.moving import later
+from planarm.model.shapes import Circle, Polygon
+from planarm.operations.replanning import first_plan, judge, plan_from
 from planarm.pipeline import plan_scene, planning_margin_cm
 from planarm.routes.moving_route import find_moving_route, rest_touch
 from planarm.routes.route import find_route
@@ -93,14 +95,16 @@ motion_samples = 20
 """A circle that crosses the way, after the small scene's obstacles, which rest."""
 
 
-def warm_up(*, on_roadmap: bool = False, moving: bool = False) -> None:
+def warm_up(*, on_roadmap: bool = False, moving: bool = False, replanning: bool = False) -> None:
     """Plan the small scene; the first time on a machine this compiles, later it loads from the cache.
 
-    The kernels of planners on a roadmap, and those among moving obstacles, are not wanted by other scenes, so they are
-    asked for.
+    The kernels of planners on a roadmap, those among moving obstacles, and those that answer a new obstacle are not
+    wanted by other scenes, so they are asked for.
     """
     if moving:
         warm_up_moving()
+    if replanning:
+        warm_up_replanning()
     for planner in (*PLANNERS, *((ON_ROADMAP,) if on_roadmap else ())):
         plan_scene(parse_scene(SMALL_SCENE + planner, "warm-up"), lambda _stage, _share: None)
 
@@ -130,6 +134,18 @@ def warm_up_emulator() -> None:
     with closing(open_transport("sim://", scene.link.baud, ArmSetup(scene, (0, 0)))) as transport:
         if transport.arm:
             transport.arm.settle(MOMENT_S)
+
+
+def warm_up_replanning() -> None:
+    """Plan on a roadmap, let obstacles appear beside the way, and plan again from where an arm was stopped."""
+    scene = parse_scene(SMALL_SCENE + ON_ROADMAP, "warm-up")
+    task, plan = first_plan(scene, lambda _stage, _share: None)
+    (rest_rad,) = plan.trajectory.sample(np.array([0.2 * plan.trajectory.duration_s]))[0]
+    for shape in (Circle((-4.0, 1.0), 0.1), Polygon(((-4.5, 1.0), (-4.0, 1.0), (-4.0, 1.5)))):
+        judge(plan, shape, planning_margin_cm(scene), 0.0, 0.0)
+        _, changes = task.roadmap.add_obstacle(shape)
+        task.planner.change(changes)
+    plan_from(scene, task, rest_rad, lambda _stage, _share: None)
 
 
 def warm_up_moving() -> None:

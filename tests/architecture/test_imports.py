@@ -207,6 +207,7 @@ ALLOWED: dict[str, set[str]] = {
         "planarm.link",
         "planarm.routes",
         "planarm.pipeline",
+        "planarm.operations",
     },
     "planarm.first_start": set(),
     "planarm.plan_file": {

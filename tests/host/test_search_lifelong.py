@@ -11,8 +11,10 @@ import pytest
 from planarm.search.digraph import BELOW_ONE, Bounds, bound, digraph
 from planarm.search.incremental import Changes, GraphPlanner, landmarks
 from planarm.search.indexed_heap import new_heap, put, take_out
-from planarm.search.lifelong import DONE, change, gradient_path, new_lifelong, repair, stored_path
+from planarm.search.lifelong import DONE, best_first, change, new_lifelong, repair
+from planarm.search.read_off import gradient_path, stored_path
 from planarm.search.result import SearchStatus
+from planarm.search.stored_tree import TOO_MANY, change_stored
 
 ALGORITHMS = ("roadmap_a_star", "d_star_lite", "mpd_star_lite")
 
@@ -132,8 +134,58 @@ def test_the_stored_path_is_the_one_that_the_gradient_gives(seed):
             assert path_cost(graph, stored.tolist()) == pytest.approx(path_cost(graph, steep.tolist()), rel=1e-12)
             assert looks == len(stored)
             assert edges == sum(graph.out_first[u + 1] - graph.out_first[u] for u in steep[:-1])
-        edited = made.edit()
-        change(graph, bounds, state, edited.edges, edited.costs)
+        change_stored(graph, bounds, state, made.edit()[:], made.count, np.empty(made.count, np.int64))
+
+
+def behind(state, goal, cut_edges):
+    """Nodes whose stored ways lead over one of these edges, by following each."""
+    found = set()
+    for node in np.flatnonzero(state.best >= 0).tolist():
+        at = node
+        while at != goal:
+            successor = int(state.best[at])
+            if (at, successor) in cut_edges:
+                found.add(node)
+                break
+            at = successor
+    return found
+
+
+@pytest.mark.parametrize("seed", range(30))
+def test_what_rises_cuts_off_the_branch_behind_it_and_nothing_else(seed):
+    rng = random.Random(seed)
+    made = RandomGraph(rng, parallel=False)
+    graph, bounds, start = made.graph(), made.bounds(), rng.randrange(made.count)
+    state, room = new_lifelong(made.count, start, made.goal, stores=True), np.empty(made.count, np.int64)
+    assert best_first(graph, bounds, state) == DONE
+    for _ in range(6):
+        before, edited = state.g.copy(), made.edit()
+        rises = edited.costs > graph.cost[edited.edges]
+        ends = {(int(graph.tail[e]), int(graph.head[e])) for e in edited.edges[rises]}
+        cut = behind(state, made.goal, ends)
+        assert change_stored(graph, bounds, state, edited[:], made.count, room) == len(cut)
+        assert set(room[: len(cut)].tolist()) == cut
+        kept = [node for node in range(made.count) if node not in cut]
+        assert (state.g[kept] == before[kept]).all()
+        assert not np.isfinite(state.g[list(cut)]).any()
+        for node in cut:  # the best of the successors that are left
+            ways = [graph.cost[e] + state.g[graph.head[e]] for e in range(len(graph.cost)) if graph.tail[e] == node]
+            assert state.rhs[node] == min(ways, default=np.inf)
+        assert repair(graph, bounds, state) == DONE
+        wanted = dijkstra(graph, made.goal)
+        assert state.rhs[start] == pytest.approx(wanted.get(start, math.inf), rel=1e-9)
+
+
+def test_a_branch_that_is_too_large_is_left_and_told():
+    graph = digraph(5, [1, 2, 3, 4], [0, 1, 2, 3], [1.0, 1.0, 1.0, 1.0])
+    room = np.empty(5, np.int64)
+    for most, wanted in ((4, 4), (3, TOO_MANY), (0, TOO_MANY)):
+        graph.cost[:] = 1.0
+        state = new_lifelong(5, 4, 0, stores=True)
+        assert best_first(graph, Bounds.none(5), state) == DONE
+        changed = (np.array([0]), np.array([2.0]))
+        assert change_stored(graph, Bounds.none(5), state, changed, most, room) == wanted
+        assert graph.cost[0] == 2.0  # told in either case
 
 
 class Walk:
@@ -172,7 +224,11 @@ class Walk:
                 break
             edges = self.seen(at)
             state.ends[0] = at
-            change(self.graph, self.bounds, state, edges, np.full(len(edges), np.inf))
+            raised = edges, np.full(len(edges), np.inf)
+            if stores:
+                change_stored(self.graph, self.bounds, state, raised, self.size**2, np.empty(self.size**2, np.int64))
+            else:
+                change(self.graph, self.bounds, state, *raised)
             if not keep_modifier:
                 state.key_modifier[0] = 0.0
             repair(self.graph, self.bounds, state)

@@ -34,7 +34,7 @@ def execute(options: argparse.Namespace) -> int:
     source = Watched(Path(options.watch)) if options.watch else Listed(load_arrivals(Path(options.arrivals)))
     with progress(options.json) as notice:
         notice("kernels", 0.0)
-        warm_up(on_roadmap=True)
+        warm_up(on_roadmap=True, replanning=True)
         notice("kernels", 1.0)
         first = first_plan(scene, notice)
         port = scene.link.port if options.port is None else options.port
@@ -42,12 +42,14 @@ def execute(options: argparse.Namespace) -> int:
         with closing(open_transport(port, scene.link.baud, setup)) as transport:
             result = run_live(scene, transport, source, notice, perf_counter, first)
     told = result.figures()
-    if options.json:
-        print(json.dumps(told))
-    else:
+    if not options.json:
         _print(told)
+    elif result.reached:
+        print(json.dumps(told))
     if not result.reached:
-        raise NoPathError(result.reason)
+        error = NoPathError(result.reason)
+        error.fields = told
+        raise error
     return 0
 
 

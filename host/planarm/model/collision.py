@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from planarm.model.arm import Arm
 from planarm.model.kinematics import forward
 from planarm.model.shapes import ObstacleSet
-from planarm_wire.kernel_cache import kernel
+from planarm_wire.kernel_cache import bare_kernel as kernel
 
 
 def pose_clearance_cm(arm: Arm, q_rad: ArrayLike, obstacles: ObstacleSet) -> float:

@@ -6,7 +6,7 @@ are computed when they are asked for, both directions at once, and kept; an edge
 
 from collections.abc import Sequence
 from math import sqrt
-from typing import Final, Self
+from typing import Final, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +17,7 @@ from planarm.dynamics.rigid_body import RigidBody, potential_energy_j
 from planarm.model.shapes import Circle, Polygon, obstacle_set
 from planarm.roadmap.moves import are_free, nearest_pairs
 from planarm.roadmap.recheck import all_ends_cm, touched_moves
-from planarm.roadmap.sampling import free_poses
+from planarm.roadmap.sampling import free_poses, in_memory_order
 from planarm.roadmap.swept import SweptCells
 from planarm.scene import EdgeCost, Scene
 from planarm.search.digraph import UNKNOWN, Bounds, Digraph, digraph
@@ -55,7 +55,7 @@ class Roadmap:
         self.world, self.model, self.cost, self.poses_rad = world, model, cost, poses_rad
         self.pairs: Ints = np.ascontiguousarray(pairs[free])
         """Free moves among the scene's obstacles, shape (m, 2)."""
-        self.graph: Digraph = _directed(len(poses_rad), self.pairs)
+        self.graph, self._edges = _directed(len(poses_rad), self.pairs)
         self._base: Floats = self.graph.cost.copy()
         """Costs without added obstacles, not a number where not asked for yet."""
         self._ends_cm = all_ends_cm(world, poses_rad)
@@ -72,7 +72,7 @@ class Roadmap:
             NoPathError: hardly any configuration is free.
         """
         world, spec = joint_world(scene, margin_cm), scene.roadmap
-        drawn = free_poses(world, spec.nodes, spec.sampling, scene.planner.seed)
+        drawn = in_memory_order(world, free_poses(world, spec.nodes, spec.sampling, scene.planner.seed))
         poses = np.concatenate([np.array(ends_rad, np.float64).reshape(-1, drawn.shape[1]), drawn])
         return cls(world, edge_model(scene), spec.cost, poses, scene.planner.neighbours)
 
@@ -80,11 +80,12 @@ class Roadmap:
 
     def cost_into(self, node: int) -> None:
         """Compute the costs, not known yet, of all edges into a node."""
-        fill_into(self.model, KINDS[self.cost], self.poses_rad, self.graph, self._base, node)
+        fill_into(self.model, KINDS[self.cost], self.poses_rad, self.graph, self._edges, self._base, node)
 
     def cost_all(self) -> None:
         """Compute all costs that are not known yet."""
-        fill_moves(self.model, KINDS[self.cost], self.poses_rad, self.pairs, self._base, np.arange(len(self.pairs)))
+        every = np.arange(len(self.pairs))
+        fill_moves(self.model, KINDS[self.cost], self.poses_rad, self.pairs, self._edges, self._base, every)
         unknown = np.isnan(self.graph.cost)
         self.graph.cost[unknown] = self._base[unknown]
 
@@ -133,8 +134,8 @@ class Roadmap:
         moves = self._blocked_by.pop(number)
         self._blockers[moves] -= 1
         opened = moves[self._blockers[moves] == 0]
-        fill_moves(self.model, KINDS[self.cost], self.poses_rad, self.pairs, self._base, opened)
-        edges = _both(opened)
+        fill_moves(self.model, KINDS[self.cost], self.poses_rad, self.pairs, self._edges, self._base, opened)
+        edges = self._edges.there_and_back(opened)
         return Changes(edges, self._base[edges])
 
     def prepare(self) -> None:
@@ -148,7 +149,7 @@ class Roadmap:
         self._blockers[touched] += 1
         self._added += 1
         self._blocked_by[self._added] = touched
-        edges = _both(touched[self._blockers[touched] == 1])
+        edges = self._edges.there_and_back(touched[self._blockers[touched] == 1])
         return self._added, Changes(edges, np.full(len(edges), np.inf))
 
 
@@ -160,23 +161,40 @@ def edge_model(scene: Scene) -> EdgeModel:
     return EdgeModel.dc(body, DcMotors.of(scene), scene, edge_s)
 
 
-def _directed(nodes: int, pairs: Ints) -> Digraph:
+class MoveEdges(NamedTuple):
+    """Which edges of the graph are which moves."""
+
+    of_move: Ints
+    """Each move's edges, there and back; shape (m, 2)."""
+    back: Ints
+    """Each edge's other way round; shape (2 m,)."""
+
+    def there_and_back(self, moves: Ints) -> Ints:
+        """Return the directed edges of moves."""
+        return self.of_move[moves].ravel()
+
+
+def _directed(nodes: int, pairs: Ints) -> tuple[Digraph, MoveEdges]:
+    """Return the graph of moves both ways, its edges numbered by head: a search looks at edges into one node."""
     tails, heads = pairs.ravel(), pairs[:, ::-1].ravel()
-    return digraph(nodes, tails, heads, np.full(2 * len(pairs), UNKNOWN))
-
-
-def _both(moves: Ints) -> Ints:
-    """Return the directed edges of moves."""
-    return np.stack([2 * moves, 2 * moves + 1], axis=1).ravel()
+    order = np.lexsort((tails, heads))
+    number = np.empty(len(order), np.int64)
+    number[order] = np.arange(len(order))
+    of_move = number.reshape(-1, 2)
+    back = np.empty(len(order), np.int64)
+    back[of_move.ravel()] = of_move[:, ::-1].ravel()
+    return digraph(nodes, tails[order], heads[order], np.full(len(order), UNKNOWN)), MoveEdges(of_move, back)
 
 
 @kernel
-def fill_into(model: EdgeModel, kind: int, poses_rad: Floats, graph: Digraph, base: Floats, node: int) -> None:
+def fill_into(
+    model: EdgeModel, kind: int, poses_rad: Floats, graph: Digraph, edges: MoveEdges, base: Floats, node: int
+) -> None:
     """Compute the unknown costs of edges into a node, and those of their twins."""
     for k in range(graph.in_first[node], graph.in_first[node + 1]):
         e = graph.in_edge[k]
         if np.isnan(graph.cost[e]):
-            twin = e ^ 1
+            twin = edges.back[e]
             forth, back = edge_costs(model, kind, poses_rad[graph.tail[e]], poses_rad[node])
             base[e], base[twin] = forth, back
             graph.cost[e] = forth
@@ -185,11 +203,14 @@ def fill_into(model: EdgeModel, kind: int, poses_rad: Floats, graph: Digraph, ba
 
 
 @kernel
-def fill_moves(model: EdgeModel, kind: int, poses_rad: Floats, pairs: Ints, base: Floats, moves: Ints) -> None:
+def fill_moves(
+    model: EdgeModel, kind: int, poses_rad: Floats, pairs: Ints, edges: MoveEdges, base: Floats, moves: Ints
+) -> None:
     """Compute the unknown costs of moves, both directions."""
     for m in moves:
-        if np.isnan(base[2 * m]):
-            base[2 * m], base[2 * m + 1] = edge_costs(model, kind, poses_rad[pairs[m, 0]], poses_rad[pairs[m, 1]])
+        there, back = edges.of_move[m, 0], edges.of_move[m, 1]
+        if np.isnan(base[there]):
+            base[there], base[back] = edge_costs(model, kind, poses_rad[pairs[m, 0]], poses_rad[pairs[m, 1]])
 
 
 @kernel

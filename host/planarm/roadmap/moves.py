@@ -17,7 +17,7 @@ from planarm.model.collision import segment_clearance
 from planarm.model.kinematics import ROUNDING_CM
 from planarm.workspace.joint_proof import SMALLEST_CM, JointWorld, link_ends
 from planarm.workspace.proof import next_piece
-from planarm_wire.kernel_cache import kernel
+from planarm_wire.kernel_cache import bare_kernel, kernel
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -51,7 +51,7 @@ def are_free(world: JointWorld, poses_rad: Floats, pairs: Ints, which: Ints) -> 
     return out
 
 
-@kernel
+@bare_kernel
 def move_is_free(world: JointWorld, a_rad: Floats, b_rad: Floats, q: Floats, full: Floats, ends: Floats) -> bool:
     """Tell whether the straight move is proved free; q, full (n,) and ends (n + 1, 2) are room to work in."""
     joints = a_rad.shape[0]
@@ -81,7 +81,7 @@ def move_is_free(world: JointWorld, a_rad: Floats, b_rad: Floats, q: Floats, ful
     return True
 
 
-@kernel
+@bare_kernel
 def fill_full(lengths_cm: Floats, a_rad: Floats, b_rad: Floats, full: Floats) -> None:
     """Fill the module's bound for a whole move, each link's from its middle pose."""
     turned, moved = 0.0, 0.0

@@ -12,6 +12,8 @@ from planarm_wire.kernel_cache import kernel
 Floats = NDArray[np.float64]
 
 BATCH = 4096
+MOST_MORTON_BITS = 10
+SMALLEST_RAD = 1e-9
 MOST_BATCHES = 1000
 
 
@@ -43,6 +45,19 @@ def free_poses(world: JointWorld, count: int, sampling: Sampling, seed: int) -> 
         f"{found} of {MOST_BATCHES * BATCH} configurations drawn are free, roadmap.nodes asks for {count}; lower "
         "it, or workspace.clearance_cm"
     )
+
+
+def in_memory_order(world: JointWorld, poses_rad: Floats) -> Floats:
+    """Return the poses along Morton's curve: neighbours in joint space lie near each other in memory, too."""
+    joints = poses_rad.shape[1]
+    bits = min(MOST_MORTON_BITS, 62 // joints)
+    shares = (poses_rad - world.low_rad) / np.maximum(world.high_rad - world.low_rad, SMALLEST_RAD)
+    cells = np.clip(shares * (1 << bits), 0, (1 << bits) - 1).astype(np.int64)
+    code = np.zeros(len(poses_rad), np.int64)
+    for bit in range(bits):
+        for joint in range(joints):
+            code |= ((cells[:, joint] >> bit) & 1) << (bit * joints + joint)
+    return np.ascontiguousarray(poses_rad[np.argsort(code, kind="stable")])
 
 
 @kernel

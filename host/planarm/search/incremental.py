@@ -22,24 +22,23 @@ from planarm.search.lifelong import (
     UPDATED,
     best_first,
     change,
-    concerned,
-    gradient_path,
     new_lifelong,
     repair,
-    stored_path,
 )
+from planarm.search.read_off import gradient_path, stored_path
 from planarm.search.result import SearchStatus
+from planarm.search.stored_tree import TOO_MANY, change_stored
 
 GraphAlgorithm = Literal["mpd_star_lite", "d_star_lite", "roadmap_a_star"]
 
 Costing = Callable[[int], None]
 """Told a node; fills in the costs of all edges into it that are not known."""
 
-REPAIR_SHARE = 0.2
-"""A change is repaired when it concerns fewer nodes than this share of what a search anew expanded last.
+REPAIR_SHARE = 0.5
+"""A change is repaired when it cuts off fewer nodes than this share of what a search anew expanded last.
 
-A node concerned is expanded twice, once to forget and once to learn its distance, each for about the price of two
-expansions of A*; and a way that has become longer takes nodes that no way led through before."""
+A node that is cut off is found, compares its successors and is expanded again, for about the price of two expansions of
+A*; and a way that has become longer takes nodes that no way led through before."""
 
 
 NOWHERE = -1
@@ -107,6 +106,7 @@ class GraphPlanner:
         self._always_repair = always_repair
         self._last_anew = 0
         self._fresh = True
+        self._branch = np.empty(graph.nodes, np.int64)
         self._start_over(*ends)
 
     @property
@@ -119,7 +119,8 @@ class GraphPlanner:
         if self._algorithm == "roadmap_a_star":
             self._start_over(self.start, int(self._state.ends[GOAL]))
         anew, before = self._fresh, self._state.counted.copy()
-        search = best_first if self._algorithm == "roadmap_a_star" else repair
+        # A first plan has nothing to repair; D* Lite is left as it is published.
+        search = best_first if self._fresh and self._state.stores else repair
         while (needing := search(self._graph, self._bounds, self._state)) != DONE:
             if self._costing is None:
                 raise ValueError(f"the cost of an edge into node {needing} is not known, and nothing tells it")
@@ -132,23 +133,21 @@ class GraphPlanner:
 
     def change(self, changes: Changes) -> None:
         """Tell new costs of edges, known ones; MPD* Lite starts anew where that is cheaper than a repair."""
-        worth = self._always_repair or self._fresh or self._algorithm == "roadmap_a_star" or self._is_cheap(changes)
-        if self._algorithm == "roadmap_a_star" or not worth:
-            self._graph.cost[changes.edges] = changes.costs
-            self._start_over(self.start, int(self._state.ends[GOAL]))
+        edges, costs = changes
+        if not self._state.stores:
+            change(self._graph, self._bounds, self._state, edges, costs)
+            return
+        if self._fresh or self._algorithm == "roadmap_a_star":
+            self._graph.cost[edges] = costs
         else:
-            change(self._graph, self._bounds, self._state, changes.edges, changes.costs)
+            most = self._graph.nodes if self._always_repair else int(REPAIR_SHARE * self._last_anew)
+            if change_stored(self._graph, self._bounds, self._state, changes[:], most, self._branch) != TOO_MANY:
+                return
+        self._start_over(self.start, int(self._state.ends[GOAL]))
 
     def move_start(self, node: int) -> None:
         """Tell that paths begin at another node from now on."""
         self._state.ends[START] = node
-
-    def _is_cheap(self, changes: Changes) -> bool:
-        """Whether the change is worth a repair; D* Lite, which stores no successors, cannot tell and repairs."""
-        if not self._state.stores:
-            return True
-        nodes, on_path = concerned(self._graph, self._state, changes.edges, changes.costs)
-        return not on_path or nodes < REPAIR_SHARE * self._last_anew
 
     def _start_over(self, start: int, goal: int) -> None:
         stores = self._algorithm != "d_star_lite"
@@ -187,8 +186,7 @@ def landmarks(graph: Digraph, nodes: Ints) -> Floats:
 
 def _all_distances(graph: Digraph, node: int, forwards: bool) -> Floats:
     """Return every node's distance from a node, or to it, shape (n,); infinite where there is no way."""
-    turned = Digraph(graph.head, graph.tail, graph.in_first, graph.in_edge, graph.out_first, graph.out_edge, graph.cost)
     state = new_lifelong(graph.nodes, NOWHERE, node, stores=True)
-    if best_first(turned if forwards else graph, Bounds.none(graph.nodes), state) != DONE:
+    if best_first(graph.turned() if forwards else graph, Bounds.none(graph.nodes), state) != DONE:
         raise ValueError("landmarks need the costs of all edges")
     return state.g

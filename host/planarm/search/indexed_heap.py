@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from planarm_wire.kernel_cache import kernel
+from planarm_wire.kernel_cache import bare_kernel as kernel
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

@@ -24,7 +24,7 @@ from planarm.model.kinematics import ROUNDING_CM
 from planarm.model.shapes import ObstacleSet, obstacle_set, shape_of
 from planarm.scene import Scene
 from planarm.workspace.proof import BLOCKED, PROVED, UNPROVED, next_piece
-from planarm_wire.kernel_cache import kernel
+from planarm_wire.kernel_cache import bare_kernel, kernel
 
 Floats = NDArray[np.float64]
 
@@ -127,7 +127,7 @@ def pose_spare_cm(world: JointWorld, q_rad: Floats) -> float:
     return spare
 
 
-@kernel
+@bare_kernel
 def _judge(world: JointWorld, q: Floats, sway: Floats, ends: Floats) -> int:
     """Judge all poses within `sway` of q, joint by joint; BLOCKED tells of q itself. `ends` is room to work in."""
     link_ends(world, q, ends)
@@ -143,7 +143,7 @@ def _judge(world: JointWorld, q: Floats, sway: Floats, ends: Floats) -> int:
     return verdict
 
 
-@kernel
+@bare_kernel
 def link_ends(world: JointWorld, q: Floats, ends: Floats) -> None:
     """Fill the positions of base and all links' ends, shape (n + 1, 2)."""
     ends[0, 0], ends[0, 1] = world.base_x_cm, world.base_y_cm
@@ -154,7 +154,7 @@ def link_ends(world: JointWorld, q: Floats, ends: Floats) -> None:
         ends[k + 1, 1] = ends[k, 1] + world.lengths_cm[k] * np.sin(heading)
 
 
-@kernel
+@bare_kernel
 def link_spare(world: JointWorld, ends: Floats, k: int) -> float:
     """Return link k's clearance beyond the margin."""
     clearance, _ = segment_clearance(ends[k, 0], ends[k, 1], ends[k + 1, 0], ends[k + 1, 1], world.obstacles, inf)
@@ -163,7 +163,7 @@ def link_spare(world: JointWorld, ends: Floats, k: int) -> float:
     return clearance - world.margin_cm
 
 
-@kernel
+@bare_kernel
 def _end_move(world: JointWorld, ends: Floats, sway: Floats, p: int) -> float:
     """Return the module's bound for the end of link p, counted from 0."""
     reach, moved = 0.0, 0.0
@@ -174,7 +174,7 @@ def _end_move(world: JointWorld, ends: Floats, sway: Floats, p: int) -> float:
     return moved
 
 
-@kernel
+@bare_kernel
 def _largest_move(world: JointWorld, sway: Floats) -> float:
     """Return how far the joints can move any point of the arm, whatever the pose."""
     reach, moved = 0.0, 0.0
@@ -184,7 +184,7 @@ def _largest_move(world: JointWorld, sway: Floats) -> float:
     return moved
 
 
-@kernel
+@bare_kernel
 def _pose_and_sway(piece: Floats, middle: float, half: float, q: Floats, sway: Floats) -> None:
     """Fill the pose at `middle` of a piece and how far each joint gets from it within `half` on both sides."""
     for j in range(q.shape[0]):
@@ -195,7 +195,7 @@ def _pose_and_sway(piece: Floats, middle: float, half: float, q: Floats, sway: F
         sway[j] = half * (abs(rate) + half * (0.5 * abs(bend) + half * abs(twist) / 6.0))
 
 
-@kernel
+@bare_kernel
 def _leaves_limits(world: JointWorld, piece: Floats, size: float) -> float:
     """Return where in a piece a joint is farthest beyond its limits, at an end or a turning point; -1 when none is."""
     worst, at = ROUNDING_RAD, -1.0
@@ -210,7 +210,7 @@ def _leaves_limits(world: JointWorld, piece: Floats, size: float) -> float:
     return at
 
 
-@kernel
+@bare_kernel
 def turning_points(b: float, c: float, d: float) -> tuple[float, float]:
     """Return the roots of b + 2 c x + 3 d x^2; -1 for each that is none."""
     if d == 0.0:

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from planarm.model.kinematics import ROUNDING_CM
 from planarm.model.moving import MovingSet, gap_in_span
 from planarm.workspace.proof import BLOCKED, PROVED, UNPROVED, next_piece
-from planarm_wire.kernel_cache import kernel
+from planarm_wire.kernel_cache import bare_kernel as kernel
 
 Floats = NDArray[np.float64]
 

@@ -251,7 +251,7 @@ def disc_within_reach(arm: TwoLinkArm, r_cm: float, rho_cm: float) -> bool:
     return r_cm - rho_cm >= arm.r_min_cm and r_cm + rho_cm <= arm.r_max_cm
 
 
-@kernel
+@bare_kernel
 def next_piece(start: float, width: float) -> tuple[float, float]:
     """Return (start, width) of the piece to judge after [start, start + width] of a bisection of [0, 1] is settled."""
     start += width
