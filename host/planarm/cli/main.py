@@ -352,7 +352,8 @@ def _add_calibrate(commands: Commands) -> None:
         "calibrate",
         help="link lengths and zero angles from touched points",
         description="Fit link lengths and zero angles to at least four points that the tip has touched: read from a\n"
-        "CSV file with the head motor1_usteps,motor2_usteps,x_cm,y_cm, or with --port touched now.",
+        "CSV file with the head motor1_usteps,motor2_usteps,x_cm,y_cm, or with --port touched now.\n"
+        "Whether a run lost steps tells 'planarm home SCENE --prove', by the limit switches.",
     )
     command.add_argument("scene", metavar="SCENE", help="the arm as it is thought to be")
     command.add_argument("points", metavar="POINTS.csv", nargs="?", help="where motors and tip were")

@@ -115,8 +115,8 @@ def prove_steps(transport: Transport, port: str, scene: Scene, positions: Positi
     session, known_by = _ready(transport, port, scene, positions)
     if known_by != HOMED:
         raise LinkError(
-            f"nothing to compare with: since the board's last start the arm's place is {known_by or 'not known'}, not"
-            " homed; 'planarm home SCENE' before the run, then ask again after it"
+            f"nothing to compare with: the arm was not homed since the board's last start, its place is"
+            f" {known_by or 'not known'}; 'planarm home SCENE' before the run, then ask again after it"
         )
     homed = Homed(_touch_all(transport, session, scene), known_by)
     return _settle(transport, port, scene, positions, session, homed, homed.kept_usteps)
