@@ -3,7 +3,6 @@
 from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 from planarm.link.exchange import stream_plan
@@ -12,7 +11,7 @@ from planarm.link.sim_transport import SimTransport
 from planarm.pipeline import plan_scene
 from planarm.scene import load_scene
 from planarm.stepping.expand import expand
-from planarm.streaming.moving_run import EARLY_S, Timekeeper
+from planarm.streaming.moving_run import EARLY_S, Room, Timekeeper
 from planarm.streaming.plan_stream import options_for
 from planarm_wire.messages import STEP_PINS, TICKS_HZ
 from skewed_line import SkewedLine
@@ -50,7 +49,7 @@ def test_start_place_and_drift_are_within_what_is_told(plan, drift_ppm, usb):
     planned, made = [joint.ticks for joint in expand(plan.segments).steps], rises(line)
     start_cycle = made[0][0] - planned[0][0]
     assert result.began_s.least <= line.host_s(start_cycle / TICKS_HZ) <= result.began_s.most
-    assert result.began_s.most - result.began_s.least < 0.012
+    assert result.began_s.most - result.began_s.least < (0.003 if usb == "direct" else 0.008)
     looked = 0
     for one in told:
         if 0 < one.executed_segments < one.total_segments:
@@ -70,7 +69,7 @@ def arrival(plan, drift_ppm, steered):
     """How late the last step came by the computer's clock, in seconds, and the timekeeper."""
     line = line_with(drift_ppm)
     start_s = line.now_s() + 0.4
-    keeper = Timekeeper(start_s, 1.0)
+    keeper = Timekeeper(line.clock, start_s, Room(2.0, 0.5))
     options = replace(options_for(plan.scene, plan.segments), start_at_s=start_s)
     steer = keeper.steer if steered else None
     stream_plan(line, plan.segments.segments, keeper.watch, options, steer=steer)
@@ -99,4 +98,3 @@ def test_without_drift_the_path_clock_is_left_alone(plan):
     late_s, keeper = arrival(plan, 0, steered=True)
     assert 0.0 <= late_s < 0.003
     assert keeper.early_s <= EARLY_S
-    assert np.isfinite(keeper.late_s)

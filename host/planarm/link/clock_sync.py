@@ -125,12 +125,16 @@ class ClockSync:
         self._renew(sent_s, ticks, received_s)
         return self._polygon.host_s(ticks)
 
+    def host_s(self, since_ticks: int) -> Span:
+        """Return the moment so many ticks after the newest reply was made, or before it."""
+        assert self._polygon is not None and self._newest is not None, "asked after a reply"
+        return self._polygon.host_s(self._newest[0] + since_ticks)
+
     def reading(self) -> ClockReading | None:
         """Return what is known by now; None before the first reply."""
         if self._polygon is None or self._newest is None:
             return None
-        moment = self._polygon.host_s(self._newest[0])
-        return ClockReading(self._polygon.drift_ppm(), moment.plus_minus, self.replies, self.restarts)
+        return ClockReading(self._polygon.drift_ppm(), self.host_s(0).plus_minus, self.replies, self.restarts)
 
     def _renew(self, sent_s: float, ticks: int, received_s: float) -> None:
         """Let the next polygon begin half of the span after this one, and take its place at the end."""

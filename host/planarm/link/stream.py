@@ -376,6 +376,10 @@ class Stream:
     def _progress(self, status: Status, now_s: float) -> StreamProgress:
         assert self.ledger_before is not None
         moved = moved_usteps(self.ledger_before, status.ledger)
+        made_s, path_s = self._session.made_s, self._path_time.span_s(self._executed, moved)
+        if self.began_s is not None and path_s.least > 0.0:  # it began so long before, or longer where it was slowed
+            by_now_s = self._session.board_clock.host_s(-round(path_s.least * TICKS_HZ)).most
+            self.began_s = Span(self.began_s.least, min(self.began_s.most, by_now_s))
         return StreamProgress(
             path_s=self._ends_ticks[self._executed] / TICKS_HZ,
             total_s=self._ends_ticks[-1] / TICKS_HZ,
@@ -389,8 +393,8 @@ class Stream:
             free_bytes=status.free_bytes,
             retransmissions=self._session.arq_counters.retransmissions,
             rate_percent=status.rate_percent,
-            made_s=self._session.made_s,
-            path_span_s=self._path_time.span_s(self._executed, moved),
+            made_s=made_s,
+            path_span_s=path_s,
             resent=tuple(self._session.resent),
         )
 

@@ -66,6 +66,7 @@ def _clock_figures(streamed: StreamResult) -> dict[str, float]:
         "board_clock_drift_ppm": round(clock.drift_ppm.middle, 1),
         "board_clock_drift_plus_minus_ppm": round(clock.drift_ppm.plus_minus, 1),
         "board_clock_plus_minus_ms": round(1e3 * clock.moment_s, 3),
+        "board_clock_restarts": clock.restarts,
         "start_plus_minus_ms": round(1e3 * began_s.plus_minus, 3),
     }
 
