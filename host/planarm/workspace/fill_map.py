@@ -246,8 +246,8 @@ def _fill_cells(
 @kernel
 def _pose_cells(arm: TwoLinkArm, x_cm: Floats, y_cm: Floats, work: Floats) -> None:
     """Fill in, for the cells row by row, tip, its distance and elbow, seen from the base, and that nothing is near."""
-    l1, l2, side = arm.l1_cm, arm.l2_cm, arm.side
-    difference, columns = l1 * l1 - l2 * l2, x_cm.size
+    # As elbow_from_base in world.py, to the last bit: whoever proves a move from a node has to see the node's pose.
+    l1, l2, side, columns = arm.l1_cm, arm.l2_cm, arm.side, x_cm.size
     for row in range(y_cm.size):
         first, y = row * columns, y_cm[row] - arm.base_y_cm
         for ix in range(columns):
@@ -256,7 +256,7 @@ def _pose_cells(arm: TwoLinkArm, x_cm: Floats, y_cm: Floats, work: Floats) -> No
             r2 = x * x + y * y
             r = sqrt(r2)
             per_r = 1.0 / max(r, SINGULAR_CM)
-            along = min(l1, max(-l1, 0.5 * (r2 + difference) * per_r))
+            along = min(l1, max(-l1, 0.5 * (r2 + l1 * l1 - l2 * l2) * per_r))
             aside = side * sqrt(l1 * l1 - along * along)
             work[X + c], work[Y + c], work[R + c] = x, y, r
             work[EX + c], work[EY + c] = per_r * (x * along - y * aside), per_r * (y * along + x * aside)
