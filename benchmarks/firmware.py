@@ -18,9 +18,10 @@ ROOT = Path(__file__).parents[1]
 sys.path[:0] = [str(ROOT / "tests"), str(ROOT / "tests" / "firmware")]
 
 from test_firmware_stretch import FAST, SEGMENT_TICKS, Player  # noqa: E402
-from test_firmware_uno import Streamer, fast, restless  # noqa: E402
+from test_firmware_uno import Streamer  # noqa: E402
 
 from firmware_board import LEAD_TICKS, Board, EmulatedFirmware, Schedule, end_motion  # noqa: E402 - the tests' board
+from firmware_motions import fast, restless  # noqa: E402
 from planarm.stepping.segments import Coding, compress  # noqa: E402
 from planarm_wire.codec import encode  # noqa: E402
 from planarm_wire.framing import encode_frame  # noqa: E402

@@ -1,12 +1,12 @@
 """Builds the firmware, directly and through PlatformIO, and keeps the released image.
 
-    python firmware/build.py avr        hex and elf by avr-gcc
+    python firmware/build.py avr        hex and elf by avr-gcc, of every board of core/boards
     python firmware/build.py pio        the same through `pio run`, without PlatformIO's registry
     python firmware/build.py native     the core as a shared library for this computer, for tests
     python firmware/build.py test       the core's own tests through `pio test`, sanitizers on
     python firmware/build.py fuzz       libFuzzer's target, by clang: OUT/fuzz_line [CORPUS] [-runs=N]
-    python firmware/build.py release    writes release/uno.hex and release/uno.json
-    python firmware/build.py check      proves that both builds equal release/uno.hex, byte for byte
+    python firmware/build.py release    writes release/BOARD.hex and release/BOARD.json of every board
+    python firmware/build.py check      proves that both builds equal release/*.hex, byte for byte
 
 Sources and flags are those of platformio.ini, in PlatformIO's order, so that both builds agree. Nothing in an image
 depends on the time or the place of its build. Needs the standard library only; exits 1 with the reason on failure.
@@ -28,8 +28,8 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 
 FIRMWARE = Path(__file__).resolve().parent
-RELEASE_HEX = FIRMWARE / "release" / "uno.hex"
-RELEASE_JSON = FIRMWARE / "release" / "uno.json"
+BOARDS = tuple(sorted(path.name for path in (FIRMWARE / "core" / "boards").iterdir()))
+RELEASE = FIRMWARE / "release"
 BUILD = FIRMWARE / "build"
 
 # What PlatformIO's platform adds to the flags of platformio.ini.
@@ -47,7 +47,7 @@ class BuildError(Exception):
 
 @dataclass(frozen=True, slots=True)
 class Release:
-    """What release/uno.json tells of release/uno.hex."""
+    """What release/BOARD.json tells of release/BOARD.hex."""
 
     sha256: str
     flash_bytes: int
@@ -82,9 +82,12 @@ def read_settings(environment: str) -> tuple[list[str], list[Path]]:
     """Return the build flags and the sources, in link order, of one environment of platformio.ini."""
     ini = configparser.ConfigParser(interpolation=None)
     ini.read(FIRMWARE / "platformio.ini", encoding="utf-8")
-    section = ini[f"env:{environment}"]
-    flags = section["build_flags"].replace("${env.build_flags}", ini["env"]["build_flags"])
-    patterns = re.findall(r"\+<([^>]+)>", section["build_src_filter"])
+
+    def option(section: str, name: str) -> str:
+        return re.sub(r"\$\{(\w+)\.(\w+)\}", lambda found: option(found[1], found[2]), ini[section][name])
+
+    flags = option(f"env:{environment}", "build_flags")
+    patterns = re.findall(r"\+<([^>]+)>", option(f"env:{environment}", "build_src_filter"))
     sources = sorted(path.relative_to(FIRMWARE) for pattern in patterns for path in FIRMWARE.glob(pattern))
     return " ".join(flags.splitlines()).replace("-I ", "-I").split(), sources
 
@@ -102,7 +105,7 @@ def require_free_registers(elf: Path, flags: list[str]) -> None:
         raise BuildError(f"{elf}: no __ctors_end, where the code begins")
     disassemble = ["avr-objdump", "-d", "--no-show-raw-insn", f"--start-address=0x{code.group(1)}", str(elf)]
     for function in run(disassemble).split("\n\n"):
-        if re.search(r"<(__vector_\d+|_ZN3hal\d+(set_)?step_fraction\w+)>", function.split("\n", 1)[0]):
+        if re.search(r"<(__vector_(7|11|12|18|19)|_ZN3hal\d+(set_)?step_fraction\w+)>", function.split("\n", 1)[0]):
             continue
         for line in function.splitlines()[1:]:
             address, _, instruction = line.partition(":\t")
@@ -112,17 +115,24 @@ def require_free_registers(elf: Path, flags: list[str]) -> None:
 
 
 def build_avr(out: Path) -> Path:
-    """Build uno.elf and uno.hex in `out` by avr-gcc; return the hex. Reserved registers are checked."""
-    flags, sources = read_settings("uno")
+    """Build BOARD.elf and BOARD.hex of every board in `out` by avr-gcc; return the folder."""
+    for board in BOARDS:
+        build_image(out, board)
+    return out
+
+
+def build_image(out: Path, board: str) -> Path:
+    """Build BOARD.elf and BOARD.hex in `out` by avr-gcc; return the hex. Reserved registers are checked."""
+    flags, sources = read_settings(board)
     compile_flags = [flag for flag in flags if not flag.startswith("-Wl,")]
     link_flags = [flag for flag in flags if flag.startswith("-Wl,")]
     objects = []
     for source in sources:
-        target = out / "uno" / source.with_suffix(".o")
+        target = out / board / source.with_suffix(".o")
         target.parent.mkdir(parents=True, exist_ok=True)
         run(["avr-g++", "-c", *PLATFORM_COMPILE, *compile_flags, "-o", str(target), str(source)])
         objects.append(str(target))
-    elf, image = out / "uno.elf", out / "uno.hex"
+    elf, image = out / f"{board}.elf", out / f"{board}.hex"
     run(["avr-g++", *PLATFORM_LINK, *link_flags, "-o", str(elf), *objects])
     require_free_registers(elf, flags)
     run(["avr-objcopy", "-O", "ihex", "-R", ".eeprom", str(elf), str(image)])
@@ -155,9 +165,9 @@ def run_pio(out: Path, *arguments: str) -> str:
 
 
 def build_pio(out: Path) -> Path:
-    """Build with `pio run`; return the hex."""
-    run_pio(out, "run", "-e", "uno")
-    return out / "pio" / "build" / "uno" / "program.hex"
+    """Build every board's image with `pio run`; return the folder that has one for each."""
+    run_pio(out, "run", *(word for board in BOARDS for word in ("-e", board)))
+    return out / "pio" / "build"
 
 
 def test_pio(out: Path) -> str:
@@ -208,37 +218,45 @@ def describe(image: Path) -> Release:
 
 
 def release(out: Path) -> Path:
-    """Build and write the released image with its description; return it."""
-    image = build_avr(out)
-    RELEASE_HEX.parent.mkdir(exist_ok=True)
-    RELEASE_HEX.write_bytes(image.read_bytes())
-    RELEASE_JSON.write_text(json.dumps(asdict(describe(image)), indent=2) + "\n", encoding="utf-8")
-    return RELEASE_HEX
+    """Build and write the released images with their descriptions; return their folder."""
+    RELEASE.mkdir(exist_ok=True)
+    for board in BOARDS:
+        image = build_image(out, board)
+        (RELEASE / f"{board}.hex").write_bytes(image.read_bytes())
+        told = json.dumps(asdict(describe(image)), indent=2) + "\n"
+        (RELEASE / f"{board}.json").write_text(told, encoding="utf-8")
+    return RELEASE
 
 
-def require_released(image: Path, how: str) -> None:
+def require_released(image: Path, board: str, how: str) -> None:
     """Raise BuildError unless an image equals the released one."""
-    if image.read_bytes() == RELEASE_HEX.read_bytes():
+    released = RELEASE / f"{board}.hex"
+    if image.read_bytes() == released.read_bytes():
         return
-    told = json.loads(RELEASE_JSON.read_text(encoding="utf-8"))["compiler"]
+    told = json.loads(released.with_suffix(".json").read_text(encoding="utf-8"))["compiler"]
     here = compiler_version()
     reason = (
         "the sources changed after the release: run firmware/build.py release"
         if told == here
         else f"the release was built with {told}, here is {here}"
     )
-    raise BuildError(f"{how}: {image} differs from {RELEASE_HEX}; {reason}")
+    raise BuildError(f"{how}: {image} differs from {released}; {reason}")
 
 
 def check(out: Path) -> str:
-    """Prove that both builds give the released image, and that its description is true."""
-    image = build_avr(out)
-    require_released(image, "avr-gcc")
-    told = Release(**json.loads(RELEASE_JSON.read_text(encoding="utf-8")))
-    if told != describe(image):
-        raise BuildError(f"{RELEASE_JSON} says {told}, measured {describe(image)}; run firmware/build.py release")
-    require_released(build_pio(out), "pio run")
-    return f"{RELEASE_HEX} is what both builds give: {told}"
+    """Prove that both builds give the released images, and that their descriptions are true."""
+    words = []
+    for board in BOARDS:
+        image = build_image(out, board)
+        require_released(image, board, "avr-gcc")
+        told = Release(**json.loads((RELEASE / f"{board}.json").read_text(encoding="utf-8")))
+        if told != describe(image):
+            raise BuildError(f"release/{board}.json: {told}, measured {describe(image)}; run firmware/build.py release")
+        words.append(f"release/{board}.hex is what both builds give: {told}")
+    built = build_pio(out)
+    for board in BOARDS:
+        require_released(built / board / "program.hex", board, "pio run")
+    return "\n".join(words)
 
 
 COMMANDS: dict[str, Callable[[Path], Path | str]] = {

@@ -15,17 +15,15 @@ from pathlib import Path
 from typing import Protocol
 
 from planarm_sim import Uno
+from planarm_wire.boards import Board as Wiring
 from planarm_wire.codec import decode, encode, encoded_bytes
 from planarm_wire.framing import Frame, FrameDecoder, encode_frame
 from planarm_wire.messages import (
     BAUD,
-    DIR_PINS,
-    ENABLE_PIN,
-    JOINTS,
+    BOARDS,
     PROTOCOL_VERSION,
     QUEUE_BYTES,
     QUEUE_FRAME_BYTES,
-    STEP_PINS,
     Clear,
     Enable,
     Hello,
@@ -45,6 +43,7 @@ LEAD_TICKS = 60_000
 WAKE_TICKS = 340_000  # ENABLE, the mark in EEPROM, the drivers
 ANSWER_TICKS = 120_000  # the longest frame, what it asks for, and the answer, on the line one after the other
 REST = Move(0, 0, 0, 0)
+UNO = BOARDS["uno"]
 
 
 @dataclass(frozen=True)
@@ -76,6 +75,8 @@ class _Delays(ctypes.Structure):
 class Firmware(Protocol):
     """One board, as the host's end sees it. Ticks are cycles of 62.5 ns."""
 
+    wiring: Wiring
+
     def power_on(self, boot_count: int, tick: int, delays: Delays) -> None: ...
 
     def receive(self, data: bytes) -> None: ...
@@ -94,7 +95,8 @@ class EmulatedFirmware:
 
     BOOT_CYCLES = 500_000
 
-    def __init__(self, image: Path) -> None:
+    def __init__(self, image: Path, wiring: Wiring = UNO) -> None:
+        self.wiring = wiring
         self.uno = Uno.from_hex(image, baud=BAUD)
         self.uno.run(cycles=self.BOOT_CYCLES)
         self.uno.clear_edges()
@@ -118,7 +120,7 @@ class EmulatedFirmware:
     def take_edges(self) -> list[Edge]:
         found = [
             Edge(int(cycle), pin, int(level))
-            for pin in (*STEP_PINS, *DIR_PINS, ENABLE_PIN)
+            for pin in (*self.wiring.step_pins, *self.wiring.dir_pins, self.wiring.enable_pin)
             for cycle, level in self.uno.edges(pin)
         ]
         self.uno.clear_edges()
@@ -127,6 +129,8 @@ class EmulatedFirmware:
 
 class NativeFirmware:
     """The shared library that `firmware/build.py native` makes. It holds one board."""
+
+    wiring = UNO
 
     def __init__(self, library: Path) -> None:
         self._library = ctypes.CDLL(str(library))
@@ -191,6 +195,7 @@ class Board:
         self, firmware: NativeFirmware, *, delays: Delays = Delays(), tick: int = 0, boot_count: int = 1
     ) -> None:
         self._firmware = firmware
+        self.wiring = firmware.wiring
         self._decoder = FrameDecoder()
         self.seq = 0
         self.edges: list[Edge] = []
@@ -210,7 +215,7 @@ class Board:
         self.edges += self._firmware.take_edges()
         for item in self._decoder.feed(self._firmware.take_sent()):
             assert isinstance(item, Frame), item
-            self.replies.append((item.seq, decode(item.type_code, item.payload)))
+            self.replies.append((item.seq, decode(item.type_code, item.payload, self.wiring.joints)))
 
     def forget_replies(self) -> None:
         """Drop what came so far, a frame that is not whole included."""
@@ -299,22 +304,22 @@ class Board:
 
     def rises(self, joint: int) -> list[int]:
         """The ticks of a joint's rising STEP edges so far."""
-        return [edge.tick for edge in self.edges if edge.pin == STEP_PINS[joint] and edge.level]
+        return [edge.tick for edge in self.edges if edge.pin == self.wiring.step_pins[joint] and edge.level]
 
     def position_at(self, joint: int, tick: int) -> int:
         """Signed steps up to and with a tick, rebuilt from the pins."""
         positive = False
         position = 0
         for edge in itertools.takewhile(lambda edge: edge.tick <= tick, self.edges):
-            if edge.pin == DIR_PINS[joint]:
+            if edge.pin == self.wiring.dir_pins[joint]:
                 positive = bool(edge.level)
-            elif edge.pin == STEP_PINS[joint] and edge.level:
+            elif edge.pin == self.wiring.step_pins[joint] and edge.level:
                 position += 1 if positive else -1
         return position
 
     def motion_edges(self) -> list[Edge]:
         """All edges but ENABLE's."""
-        return [edge for edge in self.edges if edge.pin != ENABLE_PIN]
+        return [edge for edge in self.edges if edge.pin != self.wiring.enable_pin]
 
 
 def run_of(
@@ -328,9 +333,9 @@ def run_of(
     return Move(2 * steps + positive, first, (interval << 8) + fraction, add << 16)
 
 
-def segment_of(duration: int, *moves: Move, last: bool = False) -> Segment:
+def segment_of(duration: int, *moves: Move, last: bool = False, joints: int = UNO.joints) -> Segment:
     """A segment; joints without a move rest."""
-    return Segment(2 * duration + last, (*moves, *(REST,) * (JOINTS - len(moves))))
+    return Segment(2 * duration + last, (*moves, *(REST,) * (joints - len(moves))))
 
 
 def room_after(*messages: Segments) -> int:
@@ -354,7 +359,7 @@ class Schedule:
     @classmethod
     def of(cls, segments: Sequence[Segment]) -> Schedule:
         ends = list(itertools.accumulate(duration_ticks(segment) for segment in segments))
-        steps: tuple[list[tuple[int, int]], ...] = tuple([] for _ in range(JOINTS))
+        steps: tuple[list[tuple[int, int]], ...] = tuple([] for _ in segments[0].moves)
         for segment, start in zip(segments, [0, *ends], strict=False):
             for joint, ticks in enumerate(expand_moves(segment)):
                 steps[joint].extend((start + tick, direction(segment.moves[joint])) for tick in ticks)

@@ -89,8 +89,8 @@ Result config(Reader& fields, uint32_t now_ticks) {
     uint32_t start_stop_ticks[wire::JOINTS];
     for (uint32_t& ticks : start_stop_ticks) ticks = fields.u32();
     if (!is_whole(fields)) return Result::MALFORMED;
-    if (pin_map != static_cast<uint8_t>(wire::PinMap::OWN) || joints != wire::JOINTS ||
-        high_ticks > wire::MIN_STEP_HIGH_TICKS || power_config.wake_ticks > wire::MAX_SEGMENT_TICKS) {
+    if (pin_map != wire::PIN_MAP_CODE || joints != wire::JOINTS || high_ticks > wire::MIN_STEP_HIGH_TICKS ||
+        power_config.wake_ticks > wire::MAX_SEGMENT_TICKS) {
         return Result::OUT_OF_RANGE;
     }
     const Result result = try_event(Event::CONFIG, now_ticks);

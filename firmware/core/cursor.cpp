@@ -44,27 +44,6 @@ void fit(Piece& piece, uint32_t span_ticks, const Intervals& wanted) {
     piece.interval_q16 = shrinks ? mean_q16 + half : mean_q16 - half;
 }
 
-// About steps part / whole, for 0 < part <= whole: bit by bit, in 14 bits of both.
-uint8_t share(uint8_t steps, uint32_t part, uint32_t whole) {
-    while (whole > 0x3FFF) {
-        whole >>= 1;
-        part >>= 1;
-    }
-    const uint16_t term = static_cast<uint16_t>(part);
-    const uint16_t divisor = static_cast<uint16_t>(whole);
-    uint16_t rest = 0;
-    uint8_t quotient = 0;
-    for (uint8_t bit = 0x80; bit != 0; bit = static_cast<uint8_t>(bit >> 1)) {
-        rest = static_cast<uint16_t>(2 * rest + ((steps & bit) != 0 ? term : 0u));
-        quotient = static_cast<uint8_t>(2 * quotient);
-        while (rest >= divisor) {
-            rest = static_cast<uint16_t>(rest - divisor);
-            ++quotient;
-        }
-    }
-    return quotient;
-}
-
 }  // namespace
 
 void Cursor::reset() {
@@ -95,34 +74,46 @@ bool Cursor::is_calm(const Slice& slice, uint32_t start_stop_ticks) const {
     return multiply_q16(least, slice.least_stretch()) >= start_stop_ticks;
 }
 
-// Mostly the guess is right, and one look at each side of it shows that; else by halving.
-uint8_t Cursor::steps_before(uint32_t path_ticks, bool ends_segment, Fixed48& to_last) const {
+// Newton's method on the steps' times, in whole steps. Where intervals shrink it comes nearer from below;
+// where they grow it goes too far once and comes down from above. At one interval the first try is right.
+uint8_t Cursor::steps_before(uint16_t path_ticks, bool ends_segment, Fixed48& to_last) const {
     const uint8_t most =
         left_ < step_engine::MAX_RUN_STEPS ? static_cast<uint8_t>(left_) : step_engine::MAX_RUN_STEPS;
-    to_last = run_time(static_cast<uint8_t>(most - 1), interval_q16_, add_q16_);
-    if (ends_segment || reaches(to_last) < path_ticks) return most;
-    uint8_t fits = 1;
-    uint8_t fails = most;
-    uint8_t probe =
-        static_cast<uint8_t>(1 + share(static_cast<uint8_t>(most - 1), path_ticks - at_.high, to_last.high));
-    to_last = {0, 0};
-    if (probe <= fits) probe = 2;
-    if (probe >= fails) probe = static_cast<uint8_t>(fails - 1);
-    for (uint8_t turn = 0; fails - fits > 1; ++turn) {
-        const Fixed48 time = run_time(static_cast<uint8_t>(probe - 1), interval_q16_, add_q16_);
-        const bool before = reaches(time) < path_ticks;
-        if (before) {
-            fits = probe;
-            to_last = time;
-        } else {
-            fails = probe;
-        }
-        const uint8_t beside = static_cast<uint8_t>(before ? probe + 1 : probe - 1);
-        const bool inside = fits < beside && beside < fails;
-        const uint8_t middle = static_cast<uint8_t>(fits + static_cast<uint8_t>(fails - fits) / 2);
-        probe = turn < 2 && inside ? beside : middle;
+    if (ends_segment) {
+        to_last = run_time(static_cast<uint8_t>(most - 1), interval_q16_, add_q16_);
+        return most;
     }
-    return fits;
+    to_last = {0, 0};
+    uint8_t steps = 1;
+    uint32_t interval = interval_q16_;  // to the step after those
+    const uint32_t add = static_cast<uint32_t>(add_q16_);
+    for (;;) {
+        const int32_t room = static_cast<int32_t>(path_ticks - ticks_to(to_last));
+        if (room > 0) {
+            uint16_t more = static_cast<uint16_t>(static_cast<uint16_t>(room) /
+                                                  (static_cast<uint16_t>(interval >> 16) + 1u));
+            if (more > static_cast<uint8_t>(most - steps)) more = static_cast<uint8_t>(most - steps);
+            Fixed48 time = more < 2 ? Fixed48{interval >> 16, static_cast<uint16_t>(interval)}
+                                    : run_time(static_cast<uint8_t>(more), interval, add_q16_);
+            if (more == 0) {
+                if (steps == most) return steps;
+                more = 1;
+                Fixed48 next = to_last;
+                add_to(next, time);
+                if (ticks_to(next) >= path_ticks) return steps;
+            }
+            add_to(to_last, time);
+            interval += add * static_cast<uint8_t>(more);
+            steps = static_cast<uint8_t>(steps + more);
+        } else {
+            interval -= add;
+            const uint32_t beyond = static_cast<uint32_t>(-room) / ((interval >> 16) + 1);
+            const uint8_t less = beyond == 0 ? 1 : static_cast<uint8_t>(beyond);
+            subtract_from(to_last, run_time(less, interval, -add_q16_));
+            interval -= add * static_cast<uint8_t>(less - 1);
+            steps = static_cast<uint8_t>(steps - less);
+        }
+    }
 }
 
 void Cursor::advance(uint8_t steps, Fixed48 to_last) {
@@ -142,7 +133,8 @@ Piece Cursor::take(const Slice& slice) {
     piece.interval_q16 = interval_q16_;
     piece.add_q16 = static_cast<uint32_t>(add_q16_);
     Fixed48 to_last;
-    piece.steps = steps_before(slice.end_path(), slice.ends_segment(), to_last);
+    const uint16_t to_border = static_cast<uint16_t>(slice.end_path() - at_.high);
+    piece.steps = steps_before(to_border, slice.ends_segment(), to_last);
     const uint16_t first_path = slice.path_of(at_.high);
     piece.first_ticks = slice.ticks_at(first_path);
     uint32_t last_ticks = piece.first_ticks;

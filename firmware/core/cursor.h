@@ -34,11 +34,12 @@ class Cursor {
     void shift(uint32_t ticks) { last_ticks_ += ticks; }
 
   private:
-    // How many steps the next run makes before a path time, and the time from the first to the last of them.
-    uint8_t steps_before(uint32_t path_ticks, bool ends_segment, Fixed48& to_last) const;
-    // The path time of a step so long after the next one.
-    uint32_t reaches(Fixed48 time) const {
-        return at_.high + time.high + (static_cast<uint16_t>(at_.low + time.low) < time.low ? 1 : 0);
+    // How many steps the next run makes before a border so far away, and the time from the first to the last
+    // of them. The last slice of a segment takes them all.
+    uint8_t steps_before(uint16_t path_ticks, bool ends_segment, Fixed48& to_last) const;
+    // Ticks from the next step's to that of a step so long after it.
+    uint32_t ticks_to(Fixed48 time) const {
+        return time.high + (static_cast<uint16_t>(at_.low + time.low) < time.low ? 1 : 0);
     }
     void advance(uint8_t steps, Fixed48 to_last);
 

@@ -5,13 +5,15 @@
 
 #include <stdint.h>
 
+#include "wiring.h"
+
 namespace planarm {
 namespace wire {
 
 // Both ends must have the same.
 constexpr uint8_t PROTOCOL_VERSION = 2;
 // Of the specification without its wording.
-constexpr uint32_t SPEC_HASH = 0xA09583CFUL;
+constexpr uint32_t SPEC_HASH = 0x94907170UL;
 
 // Ends every frame.
 constexpr uint8_t DELIMITER = 0x7E;
@@ -37,28 +39,20 @@ constexpr uint8_t HEADER_BYTES = 3;
 // Of each of the two checks.
 constexpr uint8_t CRC_BYTES = 2;
 // Before stuffing.
-constexpr uint8_t MAX_PAYLOAD_BYTES = 48;
+constexpr uint8_t MAX_PAYLOAD_BYTES = 64;
 // On the line, all stuffed, with delimiter.
-constexpr uint8_t MAX_FRAME_BYTES = 111;
+constexpr uint8_t MAX_FRAME_BYTES = 143;
 
 // Timer1 and path clock, prescaler 1.
 constexpr uint32_t TICKS_HZ = 16000000UL;
-// Joints stepped by the compare outputs.
-constexpr uint8_t JOINTS = 2;
 // Exact on a 16 MHz Uno (UBRR 7, U2X).
 constexpr uint32_t BAUD = 250000UL;
 // Receive ring of the firmware.
 constexpr uint8_t RX_RING_BYTES = 128;
 // Most unacknowledged bytes, as encoded, the host may have in flight.
 constexpr uint8_t HOST_WINDOW_BYTES = 112;
-// Bytes of queued segments that the firmware holds: a SEGMENTS frame takes its payload and
-// queue_frame_bytes.
-constexpr uint16_t QUEUE_BYTES = 896U;
 // Bytes that each queued SEGMENTS frame takes besides its payload.
 constexpr uint8_t QUEUE_FRAME_BYTES = 1;
-// Least time between two steps of one joint, 65,041 steps/s; min_dir_setup_ticks more where it
-// turns round.
-constexpr uint8_t MIN_INTERVAL_TICKS = 246;
 // Unit of a segment's need, 2.048 ms.
 constexpr uint16_t NEED_UNIT_TICKS = 32768U;
 // Most by which the device stretches the path clock.
@@ -91,13 +85,6 @@ constexpr uint8_t MIN_STEP_HIGH_TICKS = 56;
 constexpr uint8_t MIN_STEP_LOW_TICKS = 40;
 // Least time from a DIR edge to the next rising STEP edge, 20 us.
 constexpr uint16_t MIN_DIR_SETUP_TICKS = 320U;
-
-// Step outputs, one a joint, as numbered on the board.
-constexpr uint8_t STEP_PINS[JOINTS] = {9, 10};
-// Direction outputs; high is the positive direction.
-constexpr uint8_t DIR_PINS[JOINTS] = {4, 5};
-// Active low.
-constexpr uint8_t ENABLE_PIN = 8;
 
 // Type codes of the messages.
 enum class MessageType : uint8_t {
@@ -217,7 +204,7 @@ enum class Reset : uint8_t {
 enum class PinMap : uint8_t {
     // Own wiring: STEP on the compare outputs D9 and D10.
     OWN = 0,
-    // The Arduino CNC shield: STEP on D2 and D3 by interrupt, at a lower rate.
+    // The Arduino CNC shield as it is: STEP on D2 and D3, by interrupt.
     CNC_SHIELD = 1,
 };
 
@@ -255,8 +242,8 @@ namespace enable_at {
 constexpr uint8_t ON = 0;  // u8
 }  // namespace enable_at
 
-// Segments: payload of 6 to 48 bytes.
-constexpr uint8_t SEGMENTS_MIN_BYTES = 6;
+// Segments: payload of 6 to 64 bytes.
+constexpr uint8_t SEGMENTS_MIN_BYTES = 4 + 1 * JOINTS;
 
 // Start: payload of 4 bytes.
 constexpr uint8_t START_BYTES = 4;
@@ -283,7 +270,7 @@ constexpr uint8_t QUICK = 0;  // u8
 }  // namespace stop_at
 
 // Config: payload of 22 bytes.
-constexpr uint8_t CONFIG_BYTES = 22;
+constexpr uint8_t CONFIG_BYTES = 14 + 4 * JOINTS;
 namespace config_at {
 constexpr uint8_t PIN_MAP = 0;            // u8
 constexpr uint8_t JOINTS = 1;             // u8
@@ -292,14 +279,14 @@ constexpr uint8_t OPTIONS = 3;            // u8
 constexpr uint8_t IDLE_MS = 4;            // u32, ms
 constexpr uint8_t WAKE_TICKS = 8;         // u32, ticks
 constexpr uint8_t HIGH_TICKS = 12;        // u16, ticks
-constexpr uint8_t START_STOP_TICKS = 14;  // u32 x 2, ticks
+constexpr uint8_t START_STOP_TICKS = 14;  // u32 x JOINTS, ticks
 }  // namespace config_at
 
 // SoftLimits: payload of 16 bytes.
-constexpr uint8_t SOFT_LIMITS_BYTES = 16;
+constexpr uint8_t SOFT_LIMITS_BYTES = 8 * JOINTS;
 namespace soft_limits_at {
-constexpr uint8_t LEAST_USTEPS = 0;  // i32 x 2, usteps
-constexpr uint8_t MOST_USTEPS = 8;   // i32 x 2, usteps
+constexpr uint8_t LEAST_USTEPS = 0;          // i32 x JOINTS, usteps
+constexpr uint8_t MOST_USTEPS = 4 * JOINTS;  // i32 x JOINTS, usteps
 }  // namespace soft_limits_at
 
 // Home: payload of 18 bytes.
@@ -314,13 +301,13 @@ constexpr uint8_t BACK_USTEPS = 14;  // u32, usteps
 }  // namespace home_at
 
 // SetPosition: payload of 8 bytes.
-constexpr uint8_t SET_POSITION_BYTES = 8;
+constexpr uint8_t SET_POSITION_BYTES = 4 * JOINTS;
 namespace set_position_at {
-constexpr uint8_t POSITION_USTEPS = 0;  // i32 x 2, usteps
+constexpr uint8_t POSITION_USTEPS = 0;  // i32 x JOINTS, usteps
 }  // namespace set_position_at
 
 // Welcome: payload of 31 bytes.
-constexpr uint8_t WELCOME_BYTES = 31;
+constexpr uint8_t WELCOME_BYTES = 23 + 4 * JOINTS;
 namespace welcome_at {
 constexpr uint8_t PROTOCOL_VERSION = 0;           // u8
 constexpr uint8_t HOST_NONCE = 1;                 // u32
@@ -331,11 +318,11 @@ constexpr uint8_t RESET_CAUSE = 16;               // u8
 constexpr uint8_t INTERRUPTED = 17;               // u8
 constexpr uint8_t JOINTS = 18;                    // u8
 constexpr uint8_t LEDGER_EXECUTED_SEGMENTS = 19;  // u32
-constexpr uint8_t LEDGER_POSITION_USTEPS = 23;    // i32 x 2, usteps
+constexpr uint8_t LEDGER_POSITION_USTEPS = 23;    // i32 x JOINTS, usteps
 }  // namespace welcome_at
 
 // Status: payload of 30 bytes.
-constexpr uint8_t STATUS_BYTES = 30;
+constexpr uint8_t STATUS_BYTES = 22 + 4 * JOINTS;
 namespace status_at {
 constexpr uint8_t STATE = 0;                      // u8
 constexpr uint8_t FAULT = 1;                      // u8
@@ -352,10 +339,9 @@ constexpr uint8_t OVERRIDE_PERCENT = 12;          // u8, %
 constexpr uint8_t RATE_PERCENT = 13;              // u8, %
 constexpr uint8_t MCU_TICKS = 14;                 // u32, ticks
 constexpr uint8_t LEDGER_EXECUTED_SEGMENTS = 18;  // u32
-constexpr uint8_t LEDGER_POSITION_USTEPS = 22;    // i32 x 2, usteps
+constexpr uint8_t LEDGER_POSITION_USTEPS = 22;    // i32 x JOINTS, usteps
 }  // namespace status_at
 
-static_assert(MAX_FRAME_BYTES <= HOST_WINDOW_BYTES, "the longest frame fits the host's window");
 static_assert(HOST_WINDOW_BYTES < RX_RING_BYTES, "a full window fits the receive ring");
 
 }  // namespace wire

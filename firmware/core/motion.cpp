@@ -75,7 +75,8 @@ uint32_t path_at;  // in the segment, where the next slice begins
 Cursor cursors[wire::JOINTS];
 Slice slice;  // being filled, or the last one filled
 bool filling;
-bool urgent;  // the last call of serve handed something over
+bool urgent;   // the last call of serve handed something over
+uint8_t turn;  // the joint whose run was handed over last
 
 uint32_t stretch;        // at the end of the last slice
 uint32_t prepare_ticks;  // start of the next slice
@@ -168,15 +169,18 @@ bool is_calm() {
     filling = true;
 }
 
-// Hands one run over. True when nothing of the slice is left.
+// Hands one run over, of each joint in its turn. True when nothing of the slice is left.
 bool fill_slice() {
     bool more = false;
-    for (uint8_t joint = 0; joint < wire::JOINTS; ++joint) {
+    uint8_t joint = turn;
+    for (uint8_t i = 0; i < wire::JOINTS; ++i) {
+        joint = joint == wire::JOINTS - 1 ? 0 : static_cast<uint8_t>(joint + 1);
         Cursor& cursor = cursors[joint];
         if (!cursor.has_step_before(path_at)) continue;
         if (!urgent && step_engine::has_room(joint)) {
             step_engine::append(joint, cursor.take(slice));
             urgent = true;
+            turn = joint;
         }
         more = more || cursor.has_step_before(path_at);
     }

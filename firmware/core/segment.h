@@ -28,8 +28,15 @@ struct Segment {
 // counts as resting for ever.
 struct Rest {
     static constexpr uint32_t FOREVER = 0xFFFFFFFF;
-    uint32_t ticks[wire::JOINTS] = {FOREVER, FOREVER};
-    bool positive[wire::JOINTS] = {};  // the direction of that step
+    uint32_t ticks[wire::JOINTS];
+    bool positive[wire::JOINTS];  // the direction of that step
+
+    Rest() {
+        for (uint8_t joint = 0; joint < wire::JOINTS; ++joint) {
+            ticks[joint] = FOREVER;
+            positive[joint] = false;
+        }
+    }
 };
 
 // Least time between two steps of a joint in opposite directions.

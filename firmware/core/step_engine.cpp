@@ -2,6 +2,7 @@
 
 #include "clock.h"
 #include "hal_signals.h"
+#include "joints.h"
 
 namespace planarm {
 
@@ -62,7 +63,9 @@ void take_back(uint8_t joint) {
 // Places the first edge of an idle joint's next run. False when it is too late for it.
 template <uint8_t JOINT>
 bool start(const Run& run) {
-    const uint16_t margin = hal::dir_is<JOINT>(run.dir_high) ? STEP_MARGIN_TICKS : DIR_MARGIN_TICKS;
+    const uint16_t margin =
+        static_cast<uint16_t>((hal::dir_is<JOINT>(run.dir_high) ? STEP_MARGIN_TICKS : DIR_MARGIN_TICKS) +
+                              hal::step_early_ticks<JOINT>());
     hal::dir_write<JOINT>(run.dir_high);
     hal::set_steps_left<JOINT>(run.steps);
     hal::set_step_fraction<JOINT>(run.fraction);
@@ -132,13 +135,10 @@ struct Progress {
 };
 
 void look(Progress& at) {
-    at.high[0] = hal::step_is_high<0>();
-    at.high[1] = hal::step_is_high<1>();
+    for_each_joint([&](auto joint) { at.high[joint.NUMBER] = hal::step_is_high<joint.NUMBER>(); });
     at.on = hal::step_interrupts_on() | step_missed;
-    at.left[0] = hal::steps_left<0>();
-    at.left[1] = hal::steps_left<1>();
-    at.active[0] = step_joints[0].active;
-    at.active[1] = step_joints[1].active;
+    for_each_joint([&](auto joint) { at.left[joint.NUMBER] = hal::steps_left<joint.NUMBER>(); });
+    for_each_joint([&](auto joint) { at.active[joint.NUMBER] = step_joints[joint.NUMBER].active; });
 }
 
 bool is_same(const Progress& one, const Progress& other) {
@@ -204,7 +204,9 @@ void append(uint8_t joint, const Piece& piece) {
 
 bool serve(uint32_t now_ticks) {
     if (missed()) return false;
-    if (!start_when_due<0>(now_ticks) || !start_when_due<1>(now_ticks)) {
+    bool in_time = true;
+    for_each_joint([&](auto joint) { in_time = in_time && start_when_due<joint.NUMBER>(now_ticks); });
+    if (!in_time) {
         const hal::InterruptLock lock;
         if (step_missed == 0) step_missed = STEP_MISSED_AT_START | hal::step_interrupts_on();
         hal::steps_off();
@@ -220,10 +222,10 @@ void stop() {
         hal::steps_off();
     }
     hal::wait_step_high();
-    finish_pulse<0>();
-    finish_pulse<1>();
-    cut_active<0>(on, 0);
-    cut_active<1>(on, 0);
+    for_each_joint([&](auto joint) {
+        finish_pulse<joint.NUMBER>();
+        cut_active<joint.NUMBER>(on, 0);
+    });
     for (uint8_t joint = 0; joint < wire::JOINTS; ++joint) {
         take_back(joint);
         clear(joint);
@@ -237,13 +239,17 @@ bool freeze(uint32_t& now_ticks) {
     {
         const hal::InterruptLock lock;
         counter = hal::counter();
-        if (!may_freeze<0>(counter) || !may_freeze<1>(counter)) return false;
+        bool may = true;
+        for_each_joint([&](auto joint) { may = may && may_freeze<joint.NUMBER>(counter); });
+        if (!may) return false;
         on = hal::step_interrupts_on();
         hal::steps_off();
     }
     now_ticks = clock::extend(counter);
-    cut_active<0>(on, now_ticks + static_cast<uint16_t>(hal::step_edge<0>() - counter));
-    cut_active<1>(on, now_ticks + static_cast<uint16_t>(hal::step_edge<1>() - counter));
+    for_each_joint([&](auto joint) {
+        const uint16_t away = static_cast<uint16_t>(hal::step_edge<joint.NUMBER>() - counter);
+        cut_active<joint.NUMBER>(on, now_ticks + away);
+    });
     for (uint8_t joint = 0; joint < wire::JOINTS; ++joint) take_back(joint);
     return true;
 }
@@ -260,7 +266,8 @@ Position position() {
     const Progress now = progress();
     Position total;
     total.counter = now.counter;
-    constexpr uint8_t masks[] = {hal::step_interrupt_mask<0>(), hal::step_interrupt_mask<1>()};
+    uint8_t masks[wire::JOINTS];
+    for_each_joint([&](auto joint) { masks[joint.NUMBER] = hal::step_interrupt_mask<joint.NUMBER>(); });
     for (uint8_t joint = 0; joint < wire::JOINTS; ++joint) {
         const Ring& ring = rings[joint];
         int32_t usteps = ring.position_usteps;

@@ -1,5 +1,6 @@
-// Makes the step pulses. Each joint owns a compare channel and a small ring of runs; a rising edge is always
-// made by the compare match on its scheduled tick, the falling edge by the interrupt of that match.
+// Makes the step pulses. Each joint owns a small ring of runs. Where the board's wiring has a joint on a
+// compare output its rising edge is always made by the match on its scheduled tick, the falling edge by the
+// interrupt of that match; elsewhere an interrupt makes both.
 //
 // Two sides share a ring: the main program appends runs and takes executed ones back, the step interrupt
 // works on `active` and moves on along `next`. The interrupt alone goes on to a run marked `chained`; before
@@ -35,7 +36,7 @@ struct StepJoint {
 };
 
 extern StepJoint step_joints[wire::JOINTS];
-// Not 0 after a step that came too late to be placed: both joints are disarmed, and these interrupts were on
+// Not 0 after a step that came too late to be placed: all joints are disarmed, and these interrupts were on
 // (hal::step_interrupt_mask), or STEP_MISSED_AT_START.
 extern volatile uint8_t step_missed;
 constexpr uint8_t STEP_MISSED_AT_START = 0x80;
@@ -86,7 +87,7 @@ bool serve(uint32_t now_ticks);
 // True from a missed step to the stop that follows.
 inline bool missed() { return step_missed != 0; }
 
-// Stops both joints at once and drops all runs. Steps that have risen are counted.
+// Stops all joints at once and drops all runs. Steps that have risen are counted.
 void stop();
 
 // Puts all joints to rest in the middle of what they do, at the tick returned in `now_ticks`; runs keep their
@@ -110,7 +111,7 @@ HAL_INLINE void on_match() {
     const uint8_t left = static_cast<uint8_t>(hal::steps_left<JOINT>() - 1);
     hal::set_steps_left<JOINT>(left);
     uint16_t edge;
-    uint16_t margin = STEP_MARGIN_TICKS;
+    uint16_t margin = STEP_MARGIN_TICKS + hal::step_early_ticks<JOINT>();
     if (left != 0) {
         const uint32_t ahead = run->interval_q16 + hal::step_fraction<JOINT>();
         hal::set_step_fraction<JOINT>(static_cast<uint16_t>(ahead));
@@ -132,7 +133,7 @@ HAL_INLINE void on_match() {
         }
         if (chained == Chain::REVERSED) {
             hal::dir_write<JOINT>(next->dir_high);
-            margin = DIR_MARGIN_TICKS;
+            margin = DIR_MARGIN_TICKS + hal::step_early_ticks<JOINT>();
         }
     }
     const uint16_t nearest = static_cast<uint16_t>(hal::counter() + margin);

@@ -11,10 +11,11 @@ from collections.abc import Callable, Sized
 from typing import Any, Final, SupportsIndex, cast
 
 from planarm_wire.errors import WireError
-from planarm_wire.layout import END, MAX_VARINT_BYTES, SCALARS, Field
-from planarm_wire.messages import LAYOUTS, MAX_PAYLOAD_BYTES, MESSAGES, Message, Struct
+from planarm_wire.layout import EACH_JOINT, END, MAX_VARINT_BYTES, SCALARS, Field
+from planarm_wire.messages import BOARDS, JOINTS, LAYOUTS, MAX_PAYLOAD_BYTES, MESSAGES, Message, Struct
 
 _VARINTS: Final = ("varuint", "varint")
+_JOINT_COUNTS: Final = frozenset(board.joints for board in BOARDS.values())
 
 
 def encode(message: Message) -> tuple[int, bytes]:
@@ -34,8 +35,10 @@ def encode(message: Message) -> tuple[int, bytes]:
     return int(message.TYPE), bytes(payload)
 
 
-def decode(type_code: int, payload: bytes) -> Message:
-    """Return the message that a payload holds.
+def decode(type_code: int, payload: bytes, joints: int = JOINTS) -> Message:
+    """Return the message that a payload holds, from or for a device with so many joints.
+
+    A message that tells the number of joints itself, as WELCOME does, is read by what it tells.
 
     Raises WireError, naming message and field, when the type is unknown, the payload is too short or too long, a
     number is written in more bytes than it needs or is outside its type, or a code is none of its enumeration.
@@ -46,7 +49,7 @@ def decode(type_code: int, payload: bytes) -> Message:
     place = _name(kind)
     if len(payload) > MAX_PAYLOAD_BYTES:
         raise WireError(f"{place}: a payload of {len(payload)} bytes is over MAX_PAYLOAD_BYTES = {MAX_PAYLOAD_BYTES}")
-    values, end = _read(kind, payload, 0, place)
+    values, end = _read(kind, payload, 0, place, joints)
     if end != len(payload):
         raise WireError(f"{place}: {len(payload) - end} bytes are left over after the last field")
     return cast("Message", values)
@@ -108,27 +111,30 @@ def _here(place: str, field: Field, index: int | str) -> str:
     return f"{place}.{field.name}" if index == "" else f"{place}.{field.name}[{index}]"
 
 
-def _read(kind: type[Any], data: bytes, at: int, place: str) -> tuple[Any, int]:
+def _read(kind: type[Any], data: bytes, at: int, place: str, joints: int) -> tuple[Any, int]:
     values: dict[str, Any] = {}
     for field in LAYOUTS[kind]:
         here = f"{place}.{field.name}"
         if _is_absent(field, values.__getitem__):
             values[field.name] = 0
         elif field.repeat is None:
-            values[field.name], at = _read_one(field, data, at, here)
+            values[field.name], at = _read_one(field, data, at, here, joints)
+            if field.name == "joints" and values["joints"] in _JOINT_COUNTS:
+                joints = values["joints"]
         else:
             entries: list[Any] = []
-            while len(entries) != field.repeat and (field.repeat != END or at < len(data)):
-                entry, at = _read_one(field, data, at, f"{here}[{len(entries)}]")
+            count = joints if field.repeat == EACH_JOINT else field.repeat
+            while len(entries) != count and (count != END or at < len(data)):
+                entry, at = _read_one(field, data, at, f"{here}[{len(entries)}]", joints)
                 entries.append(entry)
             _check_count(field, entries, here)
             values[field.name] = tuple(entries)
     return kind(**values), at
 
 
-def _read_one(field: Field, data: bytes, at: int, place: str) -> tuple[Any, int]:
+def _read_one(field: Field, data: bytes, at: int, place: str, joints: int) -> tuple[Any, int]:
     if isinstance(field.kind, type):
-        return _read(field.kind, data, at, place)
+        return _read(field.kind, data, at, place, joints)
     scalar = SCALARS[field.kind]
     if field.kind in _VARINTS:
         number, at = _read_leb128(data, at, place)
@@ -180,5 +186,8 @@ def _check_count(field: Field, entries: Sized, place: str) -> None:
     count = len(entries)
     if field.repeat == END and count == 0:
         raise WireError(f"{place}: is empty, needs one entry or more")
-    if field.repeat not in (END, count):
+    if field.repeat == EACH_JOINT:
+        if count not in _JOINT_COUNTS:
+            raise WireError(f"{place}: has {count} entries; devices have {sorted(_JOINT_COUNTS)} joints")
+    elif field.repeat not in (END, count):
         raise WireError(f"{place}: has {count} entries, needs {field.repeat}")

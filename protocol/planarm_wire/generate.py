@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Final
 
 from planarm_wire.errors import SpecError
-from planarm_wire.generators.header import messages_h
+from planarm_wire.generators.header import messages_h, wiring_h
 from planarm_wire.generators.page import protocol_md
 from planarm_wire.generators.python import messages_py
 from planarm_wire.spec import SPEC_PATH, Spec, load_spec
@@ -43,7 +43,8 @@ def outdated(root: Path = ROOT) -> Iterator[tuple[Path, str]]:
     A file is compared when the caller asks for the next one, so writing each before going on is safe.
     """
     spec = load_spec(root / "protocol" / "messages.toml")
-    for name, make in GENERATED.items():
+    wirings = {f"firmware/core/boards/{board.name}/wiring.h": wiring_h(board) for board in spec.boards}
+    for name, make in {**wirings, **GENERATED}.items():
         path = root / name
         text = make(spec)
         if not path.is_file() or path.read_text(encoding="utf-8") != text:

@@ -12,6 +12,9 @@ from typing import Final
 END: Final = -1
 """The `repeat` of a field that goes on to the payload's end."""
 
+EACH_JOINT: Final = -2
+"""The `repeat` of a field that is there once for each of the device's joints."""
+
 MAX_VARINT_BYTES: Final = 5
 """LEB128 carries 7 bits a byte, so 32 bits need five."""
 
@@ -47,7 +50,7 @@ class Field:
     kind: str | type
     """A key of SCALARS, or the struct's class."""
     repeat: int | None = None
-    """How many times, as a tuple; END for the rest of the payload; None for a plain value."""
+    """How many times, as a tuple; END: the rest of the payload, EACH_JOINT: once a joint; None: a plain value."""
     when: tuple[str, int] | None = None
     """(earlier field, least value): below it this field is absent from the wire and 0 in the message."""
     enum: type[IntEnum] | None = None

@@ -9,11 +9,12 @@ from dataclasses import dataclass
 from enum import IntEnum
 from typing import ClassVar, Final, NamedTuple, TypeAlias
 
-from planarm_wire.layout import END, Field
+from planarm_wire.boards import Board
+from planarm_wire.layout import EACH_JOINT, END, Field
 
 PROTOCOL_VERSION: Final = 2
 """Both ends must have the same."""
-SPEC_HASH: Final = 0xA09583CF
+SPEC_HASH: Final = 0x94907170
 """Hash of the specification without its wording."""
 DELIMITER: Final = 0x7E
 """Ends every frame."""
@@ -40,12 +41,13 @@ HEADER_BYTES: Final = 3
 """Length, seq and type."""
 CRC_BYTES: Final = 2
 """Of each of the two checks."""
-MAX_PAYLOAD_BYTES: Final = 48
+MAX_PAYLOAD_BYTES: Final = 64
 """Before stuffing."""
 TICKS_HZ: Final = 16_000_000
 """Timer1 and path clock, prescaler 1."""
 JOINTS: Final = 2
-"""Joints stepped by the compare outputs."""
+"""Joints of the board uno; a field that is there for each joint has as many entries as the device has joints (2 or 4).
+"""
 BAUD: Final = 250_000
 """Exact on a 16 MHz Uno (UBRR 7, U2X)."""
 RX_RING_BYTES: Final = 128
@@ -53,11 +55,11 @@ RX_RING_BYTES: Final = 128
 HOST_WINDOW_BYTES: Final = 112
 """Most unacknowledged bytes, as encoded, the host may have in flight."""
 QUEUE_BYTES: Final = 896
-"""Bytes of queued segments that the firmware holds: a SEGMENTS frame takes its payload and queue_frame_bytes."""
+"""Of the board uno: bytes of queued segments it holds; a SEGMENTS frame takes its payload and queue_frame_bytes."""
 QUEUE_FRAME_BYTES: Final = 1
 """Bytes that each queued SEGMENTS frame takes besides its payload."""
 MIN_INTERVAL_TICKS: Final = 246
-"""Least time between two steps of one joint, 65,041 steps/s; min_dir_setup_ticks more where it turns round."""
+"""Of the board uno: least time between two steps of one joint, 65,041 steps/s; min_dir_setup_ticks more for a turn."""
 NEED_UNIT_TICKS: Final = 32_768
 """Unit of a segment's need, 2.048 ms."""
 MAX_STRETCH: Final = 4_096
@@ -92,11 +94,66 @@ MIN_STEP_LOW_TICKS: Final = 40
 MIN_DIR_SETUP_TICKS: Final = 320
 """Least time from a DIR edge to the next rising STEP edge, 20 us."""
 STEP_PINS: Final = ("D9", "D10")
-"""One a joint; the step is the rising edge."""
+"""Of uno, one a joint; the step is the rising edge."""
 DIR_PINS: Final = ("D4", "D5")
-"""One a joint; high is the positive direction."""
+"""Of uno, one a joint; high is positive."""
 ENABLE_PIN: Final = "D8"
 """Active low."""
+BOARDS: Final[dict[str, Board]] = {
+    "uno": Board(
+        name="uno",
+        doc="Own wiring, two joints: every step rises by Timer1's compare outputs, on its tick",
+        pin_map="own",
+        joints=2,
+        queue_bytes=896,
+        min_interval_ticks=246,
+        step_pins=("D9", "D10"),
+        dir_pins=("D4", "D5"),
+        enable_pin="D8",
+        stop_pin="A0",
+        limit_pins=("A1", "A2"),
+    ),
+    "uno_four": Board(
+        name="uno_four",
+        doc="Own wiring, four joints: joints 1 and 2 as with two, joints 3 and 4 stepped by one interrupt",
+        pin_map="own",
+        joints=4,
+        queue_bytes=512,
+        min_interval_ticks=1_000,
+        step_pins=("D9", "D10", "D6", "D7"),
+        dir_pins=("D4", "D5", "D2", "D3"),
+        enable_pin="D8",
+        stop_pin="A0",
+        limit_pins=("A1", "A2", "A3", "A4"),
+    ),
+    "cnc_shield": Board(
+        name="cnc_shield",
+        doc="The Arduino CNC shield as it is, slots X and Y: every step rises in an interrupt",
+        pin_map="cnc_shield",
+        joints=2,
+        queue_bytes=896,
+        min_interval_ticks=320,
+        step_pins=("D2", "D3"),
+        dir_pins=("D5", "D6"),
+        enable_pin="D8",
+        stop_pin="A0",
+        limit_pins=("D9", "D10"),
+    ),
+    "cnc_shield_four": Board(
+        name="cnc_shield_four",
+        doc="The Arduino CNC shield as it is, slots X, Y, Z and A (D12 and D13): every step rises in an interrupt",
+        pin_map="cnc_shield",
+        joints=4,
+        queue_bytes=512,
+        min_interval_ticks=1_280,
+        step_pins=("D2", "D3", "D4", "D12"),
+        dir_pins=("D5", "D6", "D7", "D13"),
+        enable_pin="D8",
+        stop_pin="A0",
+        limit_pins=("D9", "D10", "D11", "A4"),
+    ),
+}
+"""By name; each has a flash image."""
 
 
 class MessageType(IntEnum):
@@ -247,7 +304,7 @@ class PinMap(IntEnum):
     OWN = 0
     """Own wiring: STEP on the compare outputs D9 and D10."""
     CNC_SHIELD = 1
-    """The Arduino CNC shield: STEP on D2 and D3 by interrupt, at a lower rate."""
+    """The Arduino CNC shield as it is: STEP on D2 and D3, by interrupt."""
 
 
 class Result(IntEnum):
@@ -364,7 +421,7 @@ class Segment:
     duration_flags: int
     """2 x duration in ticks, plus 1 on the last segment of a motion. (ticks, varuint)"""
     moves: tuple[Move, ...]
-    """One entry a joint. (2 x move)"""
+    """One entry a joint. (joints x move)"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -377,7 +434,7 @@ class Ledger:
     executed_segments: int
     """Whole segments executed since boot. (u32)"""
     position_usteps: tuple[int, ...]
-    """Signed steps of each joint since boot, the running segment's included. (usteps, 2 x i32)"""
+    """Signed steps of each joint since boot, the running segment's included. (usteps, joints x i32)"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -430,7 +487,7 @@ class Segments:
     value v = c below 16, else (16 + c mod 16) 2^(c div 16 - 1), and means v 2^-32 a tick: the path clock's rate, 1
     when not stretched, may change by that much in each tick.
 
-    From the host, payload 6 to 48 bytes.
+    From the host, payload 6 to 64 bytes.
     """
 
     TYPE: ClassVar[MessageType] = MessageType.SEGMENTS
@@ -528,7 +585,7 @@ class Config:
     TYPE: ClassVar[MessageType] = MessageType.CONFIG
 
     pin_map: PinMap
-    """Where the drivers are wired. (u8)"""
+    """Where the drivers are wired; must be the image's own. (u8)"""
     joints: int
     """Joints that segments tell of. (u8)"""
     dir_inverted: int
@@ -550,7 +607,7 @@ class Config:
     This firmware takes up to min_step_high_ticks. (ticks, u16)
     """
     start_stop_ticks: tuple[int, ...]
-    """Interval of each joint's start-stop speed, from which it may stop dead. (ticks, 2 x u32)"""
+    """Interval of each joint's start-stop speed, from which it may stop dead. (ticks, joints x u32)"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -565,9 +622,9 @@ class SoftLimits:
     TYPE: ClassVar[MessageType] = MessageType.SOFT_LIMITS
 
     least_usteps: tuple[int, ...]
-    """Of each joint. (usteps, 2 x i32)"""
+    """Of each joint. (usteps, joints x i32)"""
     most_usteps: tuple[int, ...]
-    """Of each joint. (usteps, 2 x i32)"""
+    """Of each joint. (usteps, joints x i32)"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -609,7 +666,7 @@ class SetPosition:
     TYPE: ClassVar[MessageType] = MessageType.SET_POSITION
 
     position_usteps: tuple[int, ...]
-    """Of each joint. (usteps, 2 x i32)"""
+    """Of each joint. (usteps, joints x i32)"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -731,11 +788,11 @@ LAYOUTS: Final[dict[type[Message | Struct], tuple[Field, ...]]] = {
     ),
     Segment: (
         Field("duration_flags", "varuint"),
-        Field("moves", Move, repeat=2),
+        Field("moves", Move, repeat=EACH_JOINT),
     ),
     Ledger: (
         Field("executed_segments", "u32"),
-        Field("position_usteps", "i32", repeat=2),
+        Field("position_usteps", "i32", repeat=EACH_JOINT),
     ),
     Hello: (
         Field("protocol_version", "u8"),
@@ -762,11 +819,11 @@ LAYOUTS: Final[dict[type[Message | Struct], tuple[Field, ...]]] = {
         Field("idle_ms", "u32"),
         Field("wake_ticks", "u32"),
         Field("high_ticks", "u16"),
-        Field("start_stop_ticks", "u32", repeat=2),
+        Field("start_stop_ticks", "u32", repeat=EACH_JOINT),
     ),
     SoftLimits: (
-        Field("least_usteps", "i32", repeat=2),
-        Field("most_usteps", "i32", repeat=2),
+        Field("least_usteps", "i32", repeat=EACH_JOINT),
+        Field("most_usteps", "i32", repeat=EACH_JOINT),
     ),
     Home: (
         Field("joint", "u8"),
@@ -776,7 +833,7 @@ LAYOUTS: Final[dict[type[Message | Struct], tuple[Field, ...]]] = {
         Field("most_usteps", "u32"),
         Field("back_usteps", "u32"),
     ),
-    SetPosition: (Field("position_usteps", "i32", repeat=2),),
+    SetPosition: (Field("position_usteps", "i32", repeat=EACH_JOINT),),
     Welcome: (
         Field("protocol_version", "u8"),
         Field("host_nonce", "u32"),

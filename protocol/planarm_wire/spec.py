@@ -11,8 +11,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final, Literal
 
+from planarm_wire.boards import Board
 from planarm_wire.errors import SpecError
-from planarm_wire.layout import END, SCALARS
+from planarm_wire.layout import EACH_JOINT, END, SCALARS
 from planarm_wire.spec_checks import check_different, check_keys, check_range, checked_name, suggestion, table_of
 
 SPEC_PATH: Final = Path(__file__).parents[1] / "messages.toml"
@@ -22,6 +23,10 @@ ENUMS: Final = {"states": "State", "faults": "Fault", "resets": "Reset", "pin_ma
 _WORDS: Final = frozenset(("doc", "text", "fix"))
 _PIN: Final = re.compile(r"[DA]\d{1,2}")
 _WHEN: Final = re.compile(r"([a-z][a-z0-9_]*) >= (\d+)")
+
+
+MOST_JOINTS: Final = 4
+"""The Uno has pins and timers for so many."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,7 +50,10 @@ class Code:
 
 @dataclass(frozen=True, slots=True)
 class FieldSpec:
-    """A field as written; `kind` names a scalar or a struct, `count` is its repeat as a number (END to the end)."""
+    """A field as written: `kind` names a scalar or a struct, `count` is its repeat as a number.
+
+    END stands for the rest of the payload, EACH_JOINT for the device's joints.
+    """
 
     name: str
     kind: str
@@ -97,6 +105,11 @@ class Framing:
     max_payload_bytes: int
 
     @property
+    def plain_frame_bytes(self) -> int:
+        """The longest frame on the line when no byte needs an escape."""
+        return self.header_bytes + self.crc_bytes + self.max_payload_bytes + self.crc_bytes + 1
+
+    @property
     def max_frame_bytes(self) -> int:
         """The longest frame on the line: every byte stuffed, and the delimiter."""
         return 2 * (self.header_bytes + self.crc_bytes + self.max_payload_bytes + self.crc_bytes) + 1
@@ -121,16 +134,6 @@ class OutOfBand:
 
 
 @dataclass(frozen=True, slots=True)
-class Board:
-    """Section board: the wiring."""
-
-    doc: str
-    step_pins: tuple[str, ...]
-    dir_pins: tuple[str, ...]
-    enable_pin: str
-
-
-@dataclass(frozen=True, slots=True)
 class Spec:
     """The whole protocol."""
 
@@ -142,7 +145,7 @@ class Spec:
     out_of_band: OutOfBand
     sequence_doc: str
     limits: tuple[Limit, ...]
-    board: Board
+    boards: tuple[Board, ...]
     states: tuple[Code, ...]
     faults: tuple[Code, ...]
     resets: tuple[Code, ...]
@@ -196,20 +199,20 @@ def _without_words(value: object) -> object:
 
 
 def _spec(data: dict[str, Any]) -> Spec:
-    sections = ("protocol", "framing", "out_of_band", "sequence", "limits", "board", *ENUMS, "structs", "messages")
+    sections = ("protocol", "framing", "out_of_band", "sequence", "limits", "boards", *ENUMS, "structs", "messages")
     check_keys(data, "top level", sections)
     protocol = table_of(data["protocol"], "protocol", {"name": str, "version": int, "doc": str})
     check_range(protocol["version"], 1, 0xFF, "protocol.version")
     framing = _framing(data["framing"])
     limits = _limits(data["limits"])
     values = {limit.name: limit.value for limit in limits}
-    for needed in ("joints", "host_window_bytes"):
+    for needed in ("joints", "queue_bytes", "min_interval_ticks", "host_window_bytes"):
         if needed not in values:
             raise SpecError(f"limits: {needed} is missing")
-    if framing.max_frame_bytes > values["host_window_bytes"]:
+    if framing.plain_frame_bytes > values["host_window_bytes"]:
         raise SpecError(
-            f"limits.host_window_bytes: {values['host_window_bytes']} is less than the longest frame, "
-            f"{framing.max_frame_bytes} bytes; raise it, or lower framing.max_payload_bytes"
+            f"limits.host_window_bytes: {values['host_window_bytes']} is less than the longest frame without escapes, "
+            f"{framing.plain_frame_bytes} bytes; raise it, or lower framing.max_payload_bytes"
         )
     structs = _structs(data["structs"], values)
     return Spec(
@@ -221,7 +224,7 @@ def _spec(data: dict[str, Any]) -> Spec:
         out_of_band=_out_of_band(data["out_of_band"], framing.reserved),
         sequence_doc=table_of(data["sequence"], "sequence", {"doc": str})["doc"],
         limits=limits,
-        board=_board(data["board"], values["joints"]),
+        boards=_boards(data["boards"], values, tuple(data["pin_maps"])),
         states=_codes(data["states"], "states", {"code": int, "doc": str}, 0, 0xFF),
         faults=_codes(data["faults"], "faults", {"code": int, "text": str, "fix": str}, 0, 0xFF),
         resets=_codes(data["resets"], "resets", {"code": int, "doc": str}, 0, 0xFF),
@@ -284,17 +287,33 @@ def _limits(value: object) -> tuple[Limit, ...]:
     return tuple(found)
 
 
-def _board(value: object, joints: int) -> Board:
-    table = table_of(value, "board", {"doc": str, "step_pins": list, "dir_pins": list, "enable_pin": str})
-    for key in ("step_pins", "dir_pins"):
-        if len(table[key]) != joints:
-            raise SpecError(f"board.{key}: {len(table[key])} pins for limits.joints = {joints}")
-    pins = (*table["step_pins"], *table["dir_pins"], table["enable_pin"])
-    for pin in pins:
-        if not isinstance(pin, str) or not _PIN.fullmatch(pin):
-            raise SpecError(f"board: {pin!r} is not a pin's name as printed on the board, such as D9")
-    check_different(pins, "board: pins")
-    return Board(table["doc"], tuple(table["step_pins"]), tuple(table["dir_pins"]), table["enable_pin"])
+def _boards(value: object, limits: Mapping[str, int], pin_maps: tuple[str, ...]) -> tuple[Board, ...]:
+    if not isinstance(value, dict) or not value:
+        raise SpecError("boards: not a table with at least one board")
+    numbers = ("joints", "queue_bytes", "min_interval_ticks")
+    lists = ("step_pins", "dir_pins", "limit_pins")
+    words = ("doc", "pin_map", "enable_pin", "stop_pin")
+    needed = {**dict.fromkeys(numbers, int), **dict.fromkeys(lists, list), **dict.fromkeys(words, str)}
+    found = []
+    for name, entry in value.items():
+        place = f"boards.{checked_name(name, 'boards')}"
+        table = table_of(entry, place, needed)
+        check_range(table["joints"], 1, MOST_JOINTS, f"{place}.joints")
+        if table["pin_map"] not in pin_maps:
+            raise SpecError(f"{place}.pin_map: {table['pin_map']!r} is none of {', '.join(pin_maps)}")
+        for key in lists:
+            if len(table[key]) != table["joints"]:
+                raise SpecError(f"{place}.{key}: {len(table[key])} pins for {table['joints']} joints")
+        pins = [pin for key in lists for pin in table[key]] + [table["enable_pin"], table["stop_pin"]]
+        for pin in pins:
+            if not isinstance(pin, str) or not _PIN.fullmatch(pin):
+                raise SpecError(f"{place}: {pin!r} is not a pin's name as printed on the board, such as D9")
+        check_different(pins, f"{place}: pins")
+        found.append(Board(name=name, **{**table, **{key: tuple(table[key]) for key in lists}}))
+    for key in numbers:
+        if getattr(found[0], key) != limits[key]:
+            raise SpecError(f"limits.{key}: {limits[key]}, but boards.{found[0].name} has {getattr(found[0], key)}")
+    return tuple(found)
 
 
 def _codes(value: object, place: str, needed: dict[str, type], low: int, high: int) -> tuple[Code, ...]:
@@ -322,7 +341,7 @@ def _structs(value: object, limits: Mapping[str, int]) -> dict[str, StructSpec]:
         fields = tuple(_fields(table["fields"], place, limits, known))
         if not fields or any(field.count == END for field in fields):
             raise SpecError(f"{place}.fields: a struct needs fields, and none of them may repeat to the end")
-        known[name] = StructSpec(name, table["doc"], fields, *_size(fields, known))
+        known[name] = StructSpec(name, table["doc"], fields, *_size(fields, known, limits["joints"]))
     return known
 
 
@@ -340,9 +359,11 @@ def _messages(
             raise SpecError(f"{place}.from: {sender!r} is neither host nor device")
         check_range(table["code"], *((0, 0x7F) if sender == "host" else (0x80, 0xFF)), f"{place}.code")
         fields = tuple(_fields(table["fields"], place, limits, structs))
-        least, most = _size(fields, structs)
-        if most > max_payload:
-            raise SpecError(f"{place}: up to {most} bytes, over framing.max_payload_bytes = {max_payload}")
+        least, most = _size(fields, structs, limits["joints"])
+        if fields and fields[-1].count != END and _size(fields, structs, MOST_JOINTS)[1] > max_payload:
+            raise SpecError(
+                f"{place}: more bytes with {MOST_JOINTS} joints than framing.max_payload_bytes = {max_payload}"
+            )
         if fields and fields[-1].count == END:
             most = max_payload
         found.append(MessageSpec(name, table["code"], sender, table["doc"], fields, least, most))
@@ -383,11 +404,11 @@ def _fields(
 
 
 def _count(repeat: object, place: str, limits: Mapping[str, int]) -> int | None:
-    """Return a repeat as a number: a count, the name of a limit, or "end"."""
+    """Return a repeat as a number: a count, the name of a limit, "joints", or "end"."""
     if repeat is None:
         return None
-    if repeat == "end":
-        return END
+    if repeat in ("end", "joints"):
+        return END if repeat == "end" else EACH_JOINT
     if isinstance(repeat, int) and not isinstance(repeat, bool):
         check_range(repeat, 1, 0xFF, f"{place}.repeat")
         return repeat
@@ -408,12 +429,16 @@ def _condition(when: str | None, place: str, before: Mapping[str, FieldSpec]) ->
     return match[1], int(match[2])
 
 
-def _size(fields: Iterable[FieldSpec], structs: Mapping[str, StructSpec]) -> tuple[int, int]:
+def _size(fields: Iterable[FieldSpec], structs: Mapping[str, StructSpec], joints: int) -> tuple[int, int]:
     """Return the least and the most bytes of `fields`; a field that repeats to the end counts once."""
     least = most = 0
     for field in fields:
-        kind = SCALARS[field.kind] if field.kind in SCALARS else structs[field.kind]
-        count = 1 if field.count is None or field.count == END else field.count
-        least += 0 if field.when else kind.min_bytes * count
-        most += kind.max_bytes * count
+        if field.kind in SCALARS:
+            scalar = SCALARS[field.kind]
+            sizes = scalar.min_bytes, scalar.max_bytes
+        else:
+            sizes = _size(structs[field.kind].fields, structs, joints)
+        count = 1 if field.count is None or field.count == END else joints if field.count == EACH_JOINT else field.count
+        least += 0 if field.when else sizes[0] * count
+        most += sizes[1] * count
     return least, most

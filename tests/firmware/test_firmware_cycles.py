@@ -6,65 +6,23 @@ The figures are those beside the code, in firmware/hal/uno. Entry takes four cyc
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from itertools import pairwise
 from pathlib import Path
 
 import pytest
 
-from firmware_board import LEAD_TICKS, Board, EmulatedFirmware, end_motion, run_of, segment_of
+from firmware_board import LEAD_TICKS, Board, end_motion, run_of, segment_of
+from firmware_tracer import INTERRUPTS_ON, RECEIVE, STEP_1, STEP_2, TRANSMIT, Tracer
 from planarm_wire.messages import STEP_PINS, Fault, Query, Segment, Segments, Start
 
 IMAGE = Path(__file__).parents[2] / "firmware" / "release" / "uno.hex"
-STEP_1, STEP_2, RECEIVE, TRANSMIT = 11, 12, 18, 19  # numbers of the vectors, from 0
 JUMP_TO_ITSELF = b"\xff\xcf"  # rjmp .-2
-ENTRY_CYCLES = 4
-INTERRUPTS_ON = 0x80
 
 STEP_CYCLES, ONWARD_CYCLES, REVERSED_CYCLES, IDLE_CYCLES = 78, 82, 92, 77
 MISSED_CYCLES, MISSED_ONWARD_CYCLES, MISSED_REVERSED_CYCLES = 85, 89, 99
 RECEIVE_CYCLES, OVERRUN_CYCLES, FULL_CYCLES = 40, 44, 40
 TRANSMIT_CYCLES = (34, 36)
-
-
-class Tracer(EmulatedFirmware):
-    """The emulated board, run by single instructions; notes (vector, cycles) of every interrupt."""
-
-    def __init__(self, image: Path) -> None:
-        super().__init__(image)
-        self.chip = self.uno._chip
-        self.done: list[tuple[int, int]] = []
-
-    def run(self, ticks: int) -> None:
-        end = self.uno.cycle + ticks
-        while self.uno.cycle < end:
-            self._step()
-        super().run(0)  # takes over what came on pins and line
-
-    def run_until(self, condition: Callable[[], bool]) -> None:
-        while not condition():
-            self._step()
-
-    def hold_interrupts(self, ticks: int) -> None:
-        """Let the main program run on for a while as if it had switched interrupts off."""
-        self.chip.sreg &= ~INTERRUPTS_ON
-        self.uno.run(cycles=ticks)
-        self.chip.sreg |= INTERRUPTS_ON
-
-    def taken(self, vector: int) -> set[int]:
-        return {cycles for number, cycles in self.done if number == vector}
-
-    def _step(self) -> None:
-        chip = self.chip
-        depth = chip.sp
-        chip.run_to(chip.cycle + 1)
-        if chip.pc % 2 or not STEP_1 <= chip.pc // 2 <= TRANSMIT:
-            return
-        vector, begun = chip.pc // 2, chip.cycle - ENTRY_CYCLES
-        assert chip.sp == depth - 2
-        while chip.sp < depth:
-            chip.run_to(chip.cycle + 1)
-        self.done.append((vector, chip.cycle - begun))
 
 
 @pytest.fixture

@@ -7,7 +7,7 @@ from xml.etree import ElementTree
 
 import pytest
 
-from planarm_wire.messages import DIR_PINS, ENABLE_PIN, STEP_PINS
+from planarm_wire.messages import BOARDS, DIR_PINS, ENABLE_PIN, STEP_PINS
 
 DOCS = Path(__file__).resolve().parents[2] / "docs"
 WIRINGS = tomllib.loads((DOCS / "wiring.toml").read_text(encoding="utf-8"))
@@ -21,26 +21,42 @@ def test_the_drawings_are_up_to_date(tmp_path):
         assert file.read_bytes() == (DOCS / "images" / file.name).read_bytes(), "run python docs/make_wiring.py"
 
 
-@pytest.mark.parametrize(("name", "slots"), [("own", ("driver 1", "driver 2")), ("cnc_shield", ("slot Y", "slot X"))])
-def test_every_wiring_brings_the_firmwares_pins_to_the_drivers(name, slots):
+DRIVERS = tuple(f"driver {number}" for number in range(1, 5))
+SLOTS = ("slot X", "slot Y", "slot Z", "slot A")
+
+
+@pytest.mark.parametrize(
+    ("name", "board", "slots"),
+    [
+        ("own", "uno", DRIVERS[:2]),
+        ("own_four", "uno_four", DRIVERS),
+        ("cnc_shield_wires", "uno", ("slot Y", "slot X")),
+        ("cnc_shield", "cnc_shield", SLOTS[:2]),
+        ("cnc_shield", "cnc_shield_four", SLOTS),
+    ],
+)
+def test_every_wiring_brings_the_firmwares_pins_to_the_drivers(name, board, slots):
+    wired = BOARDS[board]
     pin_at = {wire["to"]: wire["from"] for wire in WIRINGS[name]["wires"]}
-    for slot, step, direction in zip(slots, STEP_PINS, DIR_PINS, strict=True):
+    for slot, step, direction in zip(slots, wired.step_pins, wired.dir_pins, strict=True):
         assert (pin_at[f"{slot} STEP"], pin_at[f"{slot} DIR"], pin_at[f"{slot} ENABLE"]) == (
             step,
             direction,
-            ENABLE_PIN,
+            wired.enable_pin,
         )
+    inputs = [pin for place, pin in pin_at.items() if place.split()[0] in ("switches", "headers")]
+    assert inputs[: 1 + wired.joints] == [wired.stop_pin, *wired.limit_pins]
 
 
 def test_on_the_shield_exactly_the_wires_that_it_does_not_have_are_added():
-    shield = WIRINGS["cnc_shield"]
+    shield = WIRINGS["cnc_shield_wires"]
     for wire in shield["wires"]:
         assert wire.get("added", False) == (shield["nets"][wire["to"]] != wire["from"])
 
 
 def test_no_added_wire_joins_two_outputs():
     """What a wire joins to a pin of the firmware is no output of it."""
-    shield = WIRINGS["cnc_shield"]
+    shield = WIRINGS["cnc_shield_wires"]
     outputs = {*STEP_PINS, *DIR_PINS, ENABLE_PIN}
     joined = {shield["nets"][wire["to"]] for wire in shield["wires"] if wire.get("added")}
     assert joined == {"D2", "D3", "D6"}

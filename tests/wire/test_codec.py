@@ -13,7 +13,7 @@ from planarm_wire import messages as m
 from planarm_wire.codec import decode, encode, encoded_bytes
 from planarm_wire.errors import WireError
 from planarm_wire.framing import FrameDecoder, encode_frame
-from planarm_wire.layout import END, SCALARS, Field
+from planarm_wire.layout import EACH_JOINT, END, SCALARS, Field
 
 
 def values(field: Field) -> st.SearchStrategy[Any]:
@@ -32,10 +32,13 @@ def items(draw: st.DrawFn, kind: type) -> Any:
     for field in m.LAYOUTS[kind]:
         if field.when is not None and fields[field.when[0]] < field.when[1]:
             fields[field.name] = 0
+        elif field.name == "joints":  # the other count of a device says how many entries follow
+            fields[field.name] = draw(st.integers(0, 255).filter(lambda joints: joints != 4))
         elif field.repeat is None:
             fields[field.name] = draw(values(field))
         else:
-            least, most = (1, 16) if field.repeat == END else (field.repeat, field.repeat)
+            count = m.JOINTS if field.repeat == EACH_JOINT else field.repeat
+            least, most = (1, 16) if field.repeat == END else (count, count)
             fields[field.name] = tuple(draw(st.lists(values(field), min_size=least, max_size=most)))
     return kind(**fields)
 
@@ -124,7 +127,7 @@ REFUSED: dict[str, tuple[Any, str]] = {
     "no whole number": (m.Start(1.5), "start.lead_ticks: is 1.5, not a whole number"),
     "too few entries": (
         m.Segments(0, 0, 0, (m.Segment(2, (REST,)),)),
-        "segments.segments[0].moves: has 1 entries, needs 2",
+        "segments.segments[0].moves: has 1 entries; devices have [2, 4] joints",
     ),
     "no entry": (m.Segments(0, 0, 0, ()), "segments.segments: is empty, needs one entry or more"),
     "not the struct": (
@@ -144,8 +147,8 @@ REFUSED: dict[str, tuple[Any, str]] = {
         "status.state: 99 is no State (known: 0 IDLE, 1 READY, 2 RUNNING, 3 FAULT, ",
     ),
     "payload too long": (
-        m.Segments(0, 0, 0, (m.Segment(2, (REST, REST)),) * 16),
-        "segments: the payload has 51 bytes, over MAX_PAYLOAD_BYTES = 48; put fewer segments into one message",
+        m.Segments(0, 0, 0, (m.Segment(2, (REST, REST)),) * 21),
+        "segments: the payload has 66 bytes, over MAX_PAYLOAD_BYTES = 64; put fewer segments into one message",
     ),
 }
 
@@ -189,7 +192,7 @@ UNREADABLE = {
         "segments.segments[0].moves[1].first_ticks: the payload ends inside this",
     ),
     "unknown code": (0x82, "00 63" + "00" * 29, "status.fault: 99 is no Fault (known: 0 NONE, "),
-    "over the limit": (0x04, "00" * 49, "segments: a payload of 49 bytes is over MAX_PAYLOAD_BYTES = 48"),
+    "over the limit": (0x04, "00" * 65, "segments: a payload of 65 bytes is over MAX_PAYLOAD_BYTES = 64"),
 }
 
 
@@ -198,3 +201,37 @@ def test_a_payload_that_holds_no_message_is_refused(case: str) -> None:
     type_code, payload, text = UNREADABLE[case]
     with pytest.raises(WireError, match=f"^{re.escape(text)}"):
         decode(type_code, bytes.fromhex(payload))
+
+
+@pytest.mark.parametrize("name", m.BOARDS)
+def test_a_message_has_the_boards_number_of_joints(name: str) -> None:
+    joints = m.BOARDS[name].joints
+    ledger = m.Ledger(7, tuple(range(joints)))
+    welcome = m.Welcome(m.PROTOCOL_VERSION, 1, 2, 3, (0, 1, 2), m.Reset.POWER_ON, 0, joints, ledger)
+    assert decode(*encode(welcome)) == welcome, "it tells the number itself"
+    segments = m.Segments(1, 2, 3, (m.Segment(200, (REST, m.Move(3, 5), *(REST,) * (joints - 2))),))
+    assert decode(*encode(segments), joints) == segments
+    status = m.Status(m.State.READY, m.Fault.NONE, 0, m.Result.OK, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, ledger)
+    assert decode(*encode(status), joints) == status
+    other = 6 - joints
+    with pytest.raises(WireError, match=r"left over|ends"):
+        decode(*encode(status), other)
+
+
+MOVES = st.builds(
+    m.Move,
+    st.integers(4, 2 * m.MAX_SEGMENT_STEPS + 1),
+    st.integers(0, 2**21 - 1),
+    st.integers(m.MIN_INTERVAL_TICKS << 8, m.MAX_INTERVAL_TICKS << 8),
+    st.integers(-(2**27), 2**27 - 1),
+)
+
+
+@given(st.tuples(MOVES, MOVES, MOVES, MOVES), st.integers(2, 2**21 - 1), st.tuples(*[st.integers(0, 255)] * 4))
+@settings(deadline=None, max_examples=300)
+def test_a_segment_of_four_joints_fits_a_message_and_its_frame_the_window(
+    moves: tuple[m.Move, ...], duration: int, head: tuple[int, ...]
+) -> None:
+    """Of a LEB128 number only the last byte can need an escape, so a full frame is far from twice its length."""
+    frame = encode_frame(head[3], *encode(m.Segments(*head[:3], (m.Segment(duration, moves),))))
+    assert len(frame) <= m.HOST_WINDOW_BYTES

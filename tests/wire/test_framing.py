@@ -12,7 +12,6 @@ from planarm_wire.framing import Frame, FrameDecoder, FrameError, FrameFault, en
 from planarm_wire.messages import (
     DELIMITER,
     ESCAPE,
-    HOST_WINDOW_BYTES,
     MAX_PAYLOAD_BYTES,
     RESERVED,
 )
@@ -47,14 +46,14 @@ def test_no_special_byte_stands_inside_a_frame(frame: Frame) -> None:
     for index, byte in enumerate(line):
         if byte == ESCAPE:
             assert line[index + 1] ^ 0x20 in {DELIMITER, ESCAPE, *RESERVED}
-    assert len(line) <= framing.MAX_FRAME_BYTES <= HOST_WINDOW_BYTES
+    assert len(line) <= framing.MAX_FRAME_BYTES
 
 
 def test_the_worst_case_is_reached_but_for_what_the_crc_decides() -> None:
     payload = bytes((DELIMITER,)) * MAX_PAYLOAD_BYTES
     longest = max(len(encode_frame(seq, code, payload)) for seq in (ESCAPE, DELIMITER) for code in (*RESERVED, ESCAPE))
     # Only the length byte and up to four CRC bytes may stand there unescaped.
-    assert framing.MAX_FRAME_BYTES - 5 <= longest <= framing.MAX_FRAME_BYTES == 111
+    assert framing.MAX_FRAME_BYTES - 5 <= longest <= framing.MAX_FRAME_BYTES == 143
 
 
 @given(st.lists(FRAMES | NOISE, max_size=6), st.lists(st.integers(0, 400), max_size=12))
@@ -117,7 +116,7 @@ def test_each_cause_is_told() -> None:
         line[:4]: FrameFault.TRUNCATED,
         line[:-3]: FrameFault.TRUNCATED,
         line + b"\0": FrameFault.TOO_LONG,
-        b"\0" * 56: FrameFault.TOO_LONG,
+        b"\0" * 72: FrameFault.TOO_LONG,
         bytes((line[0], line[1] ^ 1)) + line[2:]: FrameFault.HEADER_CRC,
         line[:6] + b"x" + line[7:]: FrameFault.PAYLOAD_CRC,
         line[:6] + bytes((ESCAPE,)) + line[6:]: FrameFault.BAD_ESCAPE,
@@ -146,7 +145,7 @@ def test_an_endless_line_without_delimiter_holds_no_more_than_a_frame() -> None:
     [
         (256, 0, b"", "seq 256 is outside 0 .. 255"),
         (0, -1, b"", "type_code -1 is outside 0 .. 255"),
-        (0, 0, bytes(MAX_PAYLOAD_BYTES + 1), "a payload of 49 bytes is over MAX_PAYLOAD_BYTES = 48"),
+        (0, 0, bytes(MAX_PAYLOAD_BYTES + 1), "a payload of 65 bytes is over MAX_PAYLOAD_BYTES = 64"),
     ],
 )
 def test_what_fits_no_frame_is_refused(seq: int, type_code: int, payload: bytes, message: str) -> None:

@@ -156,7 +156,12 @@ def test_the_header_compiles_and_holds_the_same_numbers(compiler: str, tmp_path:
     program = tmp_path / "check.cpp"
     program.write_text(header_program())
     done = subprocess.run(
-        [*COMPILERS[compiler], "-I", str(ROOT / "firmware" / "core"), "-fsyntax-only", str(program)],
+        [
+            *COMPILERS[compiler],
+            *(f"-I{ROOT / 'firmware' / 'core' / place}" for place in (".", "boards/uno")),
+            "-fsyntax-only",
+            str(program),
+        ],
         capture_output=True,
         text=True,
         check=False,

@@ -54,12 +54,12 @@ MISTAKES = {
     "limit gone": ("joints = {", "joint_count = {", "limits: joints is missing"),
     "window too small": (
         "host_window_bytes = { value = 112",
-        "host_window_bytes = { value = 110",
-        "longest frame, 111",
+        "host_window_bytes = { value = 71",
+        "longest frame without escapes, 72",
     ),
-    "pins": ('step_pins = ["D9", "D10"]', 'step_pins = ["D9"]', "board.step_pins: 1 pins for limits.joints = 2"),
-    "pin's name": ('enable_pin = "D8"', 'enable_pin = "PB0"', "board: 'PB0' is not a pin's name"),
-    "pin twice": ('enable_pin = "D8"', 'enable_pin = "D9"', "board: pins: 'D9' stands there twice"),
+    "pins": ('step_pins = ["D9", "D10"]', 'step_pins = ["D9"]', "boards.uno.step_pins: 1 pins for 2 joints"),
+    "pin's name": ('enable_pin = "D8"', 'enable_pin = "PB0"', "boards.uno: 'PB0' is not a pin's name"),
+    "pin twice": ('enable_pin = "D8"', 'enable_pin = "D9"', "boards.uno: pins: 'D9' stands there twice"),
     "state twice": ("ready = { code = 1", "ready = { code = 0", "states: codes: 0 stands there twice"),
     "fault twice": ("underrun = { code = 2", "underrun = { code = 1", "faults: codes: 1 stands there twice"),
     "result out of range": (
@@ -115,7 +115,7 @@ MISTAKES = {
     "payload too long": (
         "repeat = 3",
         "repeat = 30",
-        "messages.welcome: up to 58 bytes, over framing.max_payload_bytes",
+        "messages.welcome: more bytes with 4 joints than framing.max_payload_bytes",
     ),
     "not a table": (
         'idle = { code = 0, doc = "drivers released',

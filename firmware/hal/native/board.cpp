@@ -8,6 +8,7 @@
 #include "hal_serial.h"
 #include "hal_signals.h"
 #include "hal_step_timer.h"
+#include "joints.h"
 #include "messages.h"
 #include "step_engine.h"
 #include "supervisor.h"
@@ -89,8 +90,11 @@ bool interrupt() {
 }
 
 void serve_interrupts() {
-    while (interrupt<0>() || interrupt<1>()) {
-    }
+    bool served;
+    do {
+        served = false;
+        planarm::for_each_joint([&](auto joint) { served = served || interrupt<joint.NUMBER>(); });
+    } while (served);
 }
 
 // Ticks up to and with the next match that asks for an interrupt, at most `most`.
@@ -230,8 +234,7 @@ namespace {
 
 void end_pulses(hal::Emergency cause) {
     hal::steps_off();
-    hal::step_fall<0>();
-    hal::step_fall<1>();
+    planarm::for_each_joint([](auto joint) { hal::step_fall<joint.NUMBER>(); });
     uno.emergency = cause;
 }
 

@@ -4,11 +4,13 @@
 
 #include <stdint.h>
 
+#include "wiring.h"
+
 #define HAL_INLINE inline
 
 namespace hal {
 
-// The simulated hardware, in board.cpp. Joints are 0 and 1.
+// The simulated hardware, in board.cpp. All joints are on compare outputs.
 namespace board {
 void lock();
 void unlock();
@@ -94,7 +96,16 @@ constexpr uint8_t step_interrupt_mask() {
 }
 
 inline uint8_t step_interrupts_on() {
-    return static_cast<uint8_t>((board::interrupt_is_on(0) ? 1 : 0) | (board::interrupt_is_on(1) ? 2 : 0));
+    uint8_t on = 0;
+    for (uint8_t joint = 0; joint < planarm::wire::JOINTS; ++joint) {
+        if (board::interrupt_is_on(joint)) on |= static_cast<uint8_t>(1 << joint);
+    }
+    return on;
+}
+
+template <uint8_t JOINT>
+constexpr uint16_t step_early_ticks() {
+    return 0;
 }
 
 template <uint8_t JOINT>
@@ -123,7 +134,7 @@ bool step_interrupt_is_on() {
 }
 
 inline void steps_off() {
-    for (uint8_t joint = 0; joint < 2; ++joint) {
+    for (uint8_t joint = 0; joint < planarm::wire::JOINTS; ++joint) {
         board::arm(joint, false);
         board::enable_interrupt(joint, false);
     }

@@ -1,20 +1,62 @@
-// Timer1 of the ATmega328P, free-running at the CPU clock, and the pins that it steps: joint 0 on OC1A (D9),
-// joint 1 on OC1B (D10). ATmega328P datasheet, section 15.
+// Timer1 of the ATmega328P, free-running at the CPU clock, and the pins that are stepped by it; ATmega328P
+// datasheet, section 15. Which pins those are tells the board's wiring.h. A joint's step is made in one of
+// three ways:
 //
-// A channel's compare output is in one of two modes. Armed: the pin toggles at the match, so it rises, and a
-// forced compare takes it low again. Disarmed: the pin falls at the match, so a match means nothing to a low
-// pin. What the step interrupts need at every step is where IN and OUT reach it: the steps left of each
-// joint's run in GPIOR0 and GPIOR1, its fraction in registers that no compiled code uses.
+// COMPARE    joints 0 and 1 on OC1A and OC1B (D9, D10). A channel's compare output is in one of two modes.
+//            Armed: the pin toggles at the match, so it rises, and a forced compare takes it low again.
+//            Disarmed: the pin falls at the match, so a match means nothing to a low pin.
+// MATCH      joints 0 and 1 on any pins: the interrupt of the same match makes the pulse, whole.
+// SCHEDULED  joints 2 and 3: Timer2's interrupt makes the pulse, whole, when Timer1 says so: scheduled.cpp.
+//
+// What the step interrupts of joints 0 and 1 need at every step is where IN and OUT reach it: the steps left
+// of each joint's run in GPIOR0 and GPIOR1, its fraction in registers that no compiled code uses.
 #pragma once
 
 #include <avr/interrupt.h>
 #include <avr/io.h>
 #include <stdint.h>
 
+#include "ports.h"
+#include "wiring.h"
+
 // The step interrupts must hold no calls.
 #define HAL_INLINE inline __attribute__((always_inline))
 
 namespace hal {
+
+enum class Output : uint8_t { COMPARE, MATCH, SCHEDULED };
+
+template <uint8_t JOINT>
+constexpr Output output() {
+    return JOINT >= 2                                                 ? Output::SCHEDULED
+           : planarm::wire::STEP_PINS[JOINT] == (JOINT == 0 ? 9 : 10) ? Output::COMPARE
+                                                                      : Output::MATCH;
+}
+
+// COM bits with both channels disarmed; on other pins the compare outputs are left alone.
+constexpr uint8_t ALL_DISARMED = output<0>() == Output::COMPARE ? _BV(COM1A1) | _BV(COM1B1) : 0;
+
+// A joint that Timer2's interrupt steps.
+struct ScheduledJoint {
+    uint16_t edge;
+    uint16_t fraction;
+    uint8_t left;
+};
+
+constexpr uint8_t SCHEDULED_JOINTS = planarm::wire::JOINTS > 2 ? planarm::wire::JOINTS - 2 : 1;
+extern ScheduledJoint scheduled[SCHEDULED_JOINTS];
+// step_interrupt_mask of those that are on.
+extern volatile uint8_t scheduled_on;
+// A scheduled step may rise so much before its tick: two that are nearer to each other rise together.
+constexpr uint16_t SCHEDULED_EARLY_TICKS = 180;
+
+// Lets Timer2's interrupt come and look.
+void wake_scheduled();
+
+template <uint8_t JOINT>
+HAL_INLINE ScheduledJoint& scheduled_joint() {
+    return scheduled[JOINT < 2 ? 0 : JOINT - 2];
+}
 
 // Holds interrupts off while it lives.
 class InterruptLock {
@@ -35,25 +77,34 @@ class InterruptLock {
 
 HAL_INLINE void compiler_barrier() { __asm__ __volatile__("" ::: "memory"); }
 
-// Starts the timer with both channels disarmed. The counter starts at 0.
+// Starts the timers with all channels disarmed. The counter starts at 0.
 inline void step_timer_init() {
-    TCCR1A = _BV(COM1A1) | _BV(COM1B1);
+    TCCR1A = ALL_DISARMED;
     TCNT1 = 0;
     TCCR1B = _BV(CS10);
+    if (planarm::wire::JOINTS > 2) TCCR2B = _BV(CS21) | _BV(CS20);  // a 32nd of the clock
 }
 
 // The timer's 16 bits. Interrupts must be off: they share the timer's TEMP register.
 HAL_INLINE uint16_t counter() { return TCNT1; }
 
+// How much before its tick a step may rise.
+template <uint8_t JOINT>
+constexpr uint16_t step_early_ticks() {
+    return output<JOINT>() == Output::SCHEDULED ? SCHEDULED_EARLY_TICKS : 0;
+}
+
 template <uint8_t JOINT>
 HAL_INLINE uint16_t step_edge() {
-    return JOINT == 0 ? OCR1A : OCR1B;
+    return output<JOINT>() == Output::SCHEDULED ? scheduled_joint<JOINT>().edge : JOINT == 0 ? OCR1A : OCR1B;
 }
 
 // Sets the tick of the next match. Interrupts must be off.
 template <uint8_t JOINT>
 HAL_INLINE void step_set_edge(uint16_t tick) {
-    if (JOINT == 0) {
+    if (output<JOINT>() == Output::SCHEDULED) {
+        scheduled_joint<JOINT>().edge = tick;
+    } else if (JOINT == 0) {
         OCR1A = tick;
     } else {
         OCR1B = tick;
@@ -63,31 +114,41 @@ HAL_INLINE void step_set_edge(uint16_t tick) {
 // The pin must be low.
 template <uint8_t JOINT>
 HAL_INLINE void step_arm() {
+    if (output<JOINT>() != Output::COMPARE) return;
     constexpr uint8_t other = JOINT == 0 ? _BV(COM1B1) | _BV(COM1B0) : _BV(COM1A1) | _BV(COM1A0);
     TCCR1A = static_cast<uint8_t>((TCCR1A & other) | (JOINT == 0 ? _BV(COM1A0) : _BV(COM1B0)));
 }
 
 template <uint8_t JOINT>
 HAL_INLINE void step_disarm() {
+    if (output<JOINT>() != Output::COMPARE) return;
     constexpr uint8_t other = JOINT == 0 ? _BV(COM1B1) | _BV(COM1B0) : _BV(COM1A1) | _BV(COM1A0);
     TCCR1A = static_cast<uint8_t>((TCCR1A & other) | (JOINT == 0 ? _BV(COM1A1) : _BV(COM1B1)));
 }
 
-// Takes the pin low: a high one when armed, any when disarmed.
+// Takes the pin low: on a compare output a high one when armed, any when disarmed.
 template <uint8_t JOINT>
 HAL_INLINE void step_fall() {
-    TCCR1C = JOINT == 0 ? _BV(FOC1A) : _BV(FOC1B);
+    if (output<JOINT>() == Output::COMPARE) {
+        TCCR1C = JOINT == 0 ? _BV(FOC1A) : _BV(FOC1B);
+    } else {
+        write_pin(planarm::wire::STEP_PINS[JOINT], false);
+    }
 }
 
 // Steps left of the active run, the current one included.
 template <uint8_t JOINT>
 HAL_INLINE uint8_t steps_left() {
-    return JOINT == 0 ? GPIOR0 : GPIOR1;
+    return output<JOINT>() == Output::SCHEDULED ? scheduled_joint<JOINT>().left
+           : JOINT == 0                         ? GPIOR0
+                                                : GPIOR1;
 }
 
 template <uint8_t JOINT>
 HAL_INLINE void set_steps_left(uint8_t steps) {
-    if (JOINT == 0) {
+    if (output<JOINT>() == Output::SCHEDULED) {
+        scheduled_joint<JOINT>().left = steps;
+    } else if (JOINT == 0) {
         GPIOR0 = steps;
     } else {
         GPIOR1 = steps;
@@ -95,50 +156,64 @@ HAL_INLINE void set_steps_left(uint8_t steps) {
 }
 
 // Fraction of the current step's tick, in 2^-16. While the joint's interrupt is on, only it may ask. In
-// step_interrupts.cpp, for joints 0 and 1.
+// step_interrupts.cpp and scheduled.cpp.
 template <uint8_t JOINT>
 uint16_t step_fraction();
 template <uint8_t JOINT>
 void set_step_fraction(uint16_t fraction);
 
+// Main never sees a pulse that an interrupt makes whole.
 template <uint8_t JOINT>
 HAL_INLINE bool step_is_high() {
-    return (PINB & (JOINT == 0 ? _BV(PINB1) : _BV(PINB2))) != 0;
+    return output<JOINT>() == Output::COMPARE && read_pin(planarm::wire::STEP_PINS[JOINT]);
 }
 
 // Forgets a match that nobody waited for.
 template <uint8_t JOINT>
 HAL_INLINE void step_forget_match() {
-    TIFR1 = JOINT == 0 ? _BV(OCF1A) : _BV(OCF1B);
-}
-
-template <uint8_t JOINT>
-HAL_INLINE void step_interrupt_on() {
-    TIMSK1 = static_cast<uint8_t>(TIMSK1 | (JOINT == 0 ? _BV(OCIE1A) : _BV(OCIE1B)));
-}
-
-template <uint8_t JOINT>
-HAL_INLINE void step_interrupt_off() {
-    TIMSK1 = static_cast<uint8_t>(TIMSK1 & ~(JOINT == 0 ? _BV(OCIE1A) : _BV(OCIE1B)));
-}
-
-template <uint8_t JOINT>
-HAL_INLINE bool step_interrupt_is_on() {
-    return (TIMSK1 & (JOINT == 0 ? _BV(OCIE1A) : _BV(OCIE1B))) != 0;
+    if (output<JOINT>() != Output::SCHEDULED) TIFR1 = JOINT == 0 ? _BV(OCF1A) : _BV(OCF1B);
 }
 
 template <uint8_t JOINT>
 constexpr uint8_t step_interrupt_mask() {
-    return JOINT == 0 ? _BV(OCIE1A) : _BV(OCIE1B);
+    return JOINT == 0 ? _BV(OCIE1A) : JOINT == 1 ? _BV(OCIE1B) : static_cast<uint8_t>(0x04 << JOINT);
+}
+
+template <uint8_t JOINT>
+HAL_INLINE void step_interrupt_on() {
+    if (output<JOINT>() == Output::SCHEDULED) {
+        scheduled_on = static_cast<uint8_t>(scheduled_on | step_interrupt_mask<JOINT>());
+        wake_scheduled();
+    } else {
+        TIMSK1 = static_cast<uint8_t>(TIMSK1 | step_interrupt_mask<JOINT>());
+    }
+}
+
+template <uint8_t JOINT>
+HAL_INLINE void step_interrupt_off() {
+    if (output<JOINT>() == Output::SCHEDULED) {
+        scheduled_on = static_cast<uint8_t>(scheduled_on & ~step_interrupt_mask<JOINT>());
+    } else {
+        TIMSK1 = static_cast<uint8_t>(TIMSK1 & ~step_interrupt_mask<JOINT>());
+    }
 }
 
 // The masks of the interrupts that are on.
-HAL_INLINE uint8_t step_interrupts_on() { return TIMSK1; }
+HAL_INLINE uint8_t step_interrupts_on() {
+    return planarm::wire::JOINTS > 2 ? static_cast<uint8_t>(TIMSK1 | scheduled_on) : TIMSK1;
+}
 
-// Disarms both channels and stops their interrupts; a pin that is high stays high.
+template <uint8_t JOINT>
+HAL_INLINE bool step_interrupt_is_on() {
+    const uint8_t on = output<JOINT>() == Output::SCHEDULED ? scheduled_on : TIMSK1;
+    return (on & step_interrupt_mask<JOINT>()) != 0;
+}
+
+// Disarms all channels and stops their interrupts; a pin that is high stays high.
 HAL_INLINE void steps_off() {
-    TCCR1A = _BV(COM1A1) | _BV(COM1B1);
+    TCCR1A = ALL_DISARMED;
     TIMSK1 = 0;
+    if (planarm::wire::JOINTS > 2) scheduled_on = TIMSK2 = 0;
 }
 
 // Passes the least high time of a pulse that may have risen just now: 19 turns of 3 cycles.
@@ -147,21 +222,15 @@ inline void wait_step_high() {
     __asm__ __volatile__("1: dec %0\n\tbrne 1b" : "+r"(turns));
 }
 
-// DIR is D4 for joint 0 and D5 for joint 1.
 template <uint8_t JOINT>
 HAL_INLINE bool dir_is(bool positive) {
-    return ((PORTD & (JOINT == 0 ? _BV(PORTD4) : _BV(PORTD5))) != 0) == positive;
+    return written_pin(planarm::wire::DIR_PINS[JOINT]) == positive;
 }
 
 // One instruction, so no lock is needed.
 template <uint8_t JOINT>
 HAL_INLINE void dir_write(bool positive) {
-    constexpr uint8_t mask = JOINT == 0 ? _BV(PORTD4) : _BV(PORTD5);
-    if (positive) {
-        PORTD |= mask;
-    } else {
-        PORTD &= static_cast<uint8_t>(~mask);
-    }
+    write_pin(planarm::wire::DIR_PINS[JOINT], positive);
 }
 
 }  // namespace hal

@@ -12,6 +12,33 @@
 
 extern uint8_t reset_flags;
 
+namespace {
+
+namespace wire = planarm::wire;
+
+constexpr uint8_t mask_if(hal::Port port, uint8_t pin) {
+    return hal::port_of(pin) == port ? hal::mask_of(pin) : 0;
+}
+
+constexpr uint8_t outputs_in(hal::Port port) {
+    return static_cast<uint8_t>(hal::mask_in(port, wire::STEP_PINS) | hal::mask_in(port, wire::DIR_PINS) |
+                                mask_if(port, wire::ENABLE_PIN));
+}
+
+constexpr uint8_t pull_ups_in(hal::Port port) {
+    return static_cast<uint8_t>(hal::mask_in(port, wire::LIMIT_PINS) | mask_if(port, wire::STOP_PIN));
+}
+
+// Computed by the compiler: early_pins runs before tables and the stack are there.
+constexpr uint8_t OUTPUTS_B = outputs_in(hal::Port::B);
+constexpr uint8_t OUTPUTS_D = outputs_in(hal::Port::D);
+static_assert(outputs_in(hal::Port::C) == 0, "port C has inputs only");
+constexpr uint8_t PULL_UPS_B = pull_ups_in(hal::Port::B);
+constexpr uint8_t PULL_UPS_C = pull_ups_in(hal::Port::C);
+constexpr uint8_t PULL_UPS_D = pull_ups_in(hal::Port::D);
+
+}  // namespace
+
 // Runs before main and before memory is set up: drivers released (ENABLE at its level before it becomes an
 // output), STEP and DIR low, pull-ups on the inputs, no watchdog left over from before the reset (ATmega328P
 // datasheet, 10.9.2).
@@ -19,11 +46,12 @@ extern "C" void early_pins() __attribute__((naked, used, section(".init3")));
 void early_pins() {
     EEAR = hal::POLARITY_ADDRESS;
     EECR = _BV(EERE);
-    if (EEDR != hal::ACTIVE_HIGH) PORTB = _BV(PORTB0);
-    DDRB = _BV(DDB0) | _BV(DDB1) | _BV(DDB2);
-    PORTD = 0;
-    DDRD = _BV(DDD4) | _BV(DDD5);
-    PORTC = _BV(PORTC0) | _BV(PORTC1) | _BV(PORTC2);
+    if (EEDR != hal::ACTIVE_HIGH) hal::write_pin(wire::ENABLE_PIN, true);
+    DDRB = OUTPUTS_B;
+    PORTD = PULL_UPS_D;
+    DDRD = OUTPUTS_D;
+    if (PULL_UPS_B != 0) PORTB = static_cast<uint8_t>(PORTB | PULL_UPS_B);
+    PORTC = PULL_UPS_C;
     reset_flags = MCUSR;
     MCUSR = 0;
     WDTCSR = _BV(WDCE) | _BV(WDE);

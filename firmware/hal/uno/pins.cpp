@@ -2,12 +2,15 @@
 #include <avr/io.h>
 
 #include "hal_pins.h"
+#include "joints.h"
 #include "polarity.h"
-
-// ENABLE is D8 (PB0); the stop input is A0 (PC0), the limit switches are A1 and A2 (PC1, PC2), all with
-// pull-ups.
+#include "ports.h"
+#include "wiring.h"
 
 namespace hal {
+
+namespace wire = planarm::wire;
+using planarm::for_each_joint;
 
 namespace {
 bool enable_active_high;
@@ -18,25 +21,19 @@ void set_enable_active_high(bool active_high) {
     keep_enable_polarity(active_high);
 }
 
-void drivers_enable(bool on) {
-    if (on == enable_active_high) {
-        PORTB |= _BV(PORTB0);
-    } else {
-        PORTB &= static_cast<uint8_t>(~_BV(PORTB0));
-    }
-}
+void drivers_enable(bool on) { write_pin(wire::ENABLE_PIN, on == enable_active_high); }
 
 uint8_t inputs() {
-    const uint8_t pins = PINC;
-    uint8_t bits = 0;
-    if ((pins & _BV(PINC0)) != 0) bits |= STOP_INPUT_OPEN;
-    if ((pins & _BV(PINC1)) == 0) bits |= 0x01;
-    if ((pins & _BV(PINC2)) == 0) bits |= 0x02;
+    uint8_t bits = read_pin(wire::STOP_PIN) ? STOP_INPUT_OPEN : 0;
+    for_each_joint([&](auto joint) {
+        if (!read_pin(wire::LIMIT_PINS[joint.NUMBER])) bits |= static_cast<uint8_t>(1 << joint.NUMBER);
+    });
     return bits;
 }
 
 void watch_stop_input(bool on) {
-    PCMSK1 = on ? _BV(PCINT8) : 0;
+    static_assert(port_of(wire::STOP_PIN) == Port::C, "PCINT1 watches port C");
+    PCMSK1 = on ? mask_of(wire::STOP_PIN) : 0;
     PCIFR = _BV(PCIF1);
     PCICR = on ? _BV(PCIE1) : 0;
 }

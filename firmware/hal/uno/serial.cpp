@@ -4,6 +4,7 @@
 #include "framing.h"
 #include "hal_serial.h"
 #include "hal_signals.h"
+#include "hal_step_timer.h"
 #include "messages.h"
 
 namespace hal {
@@ -150,6 +151,10 @@ ISR(USART_RX_vect, ISR_NAKED) {
         sts  %[tccrc], r30
         ldi  r30, 0
         sts  %[timsk], r30
+        .if %[joints] > 2
+        sts  %[scheduled_on], r30
+        sts  %[timsk2], r30
+        .endif
         ldi  r30, %[line]
         sts  %[emergency], r30
         movw r30, r4
@@ -160,18 +165,18 @@ ISR(USART_RX_vect, ISR_NAKED) {
         [head] "I"(_SFR_IO_ADDR(RING_HEAD)), [tail] "I"(_SFR_IO_ADDR(RING_TAIL)),
         [run] "I"(_SFR_IO_ADDR(EMERGENCY_RUN)), [ring] "i"(hal::ring), [size] "i"(hal::RX_RING_BYTES),
         [full] "i"(&hal::ring_full), [overruns] "I"(_SFR_IO_ADDR(OVERRUNS)), [holds] "i"(&hal::holds),
-        [repeats] "M"(planarm::wire::EMERGENCY_REPEATS), [all_disarmed] "M"(_BV(COM1A1) | _BV(COM1B1)),
+        [repeats] "M"(planarm::wire::EMERGENCY_REPEATS), [all_disarmed] "i"(hal::ALL_DISARMED),
         [all_forced] "M"(_BV(FOC1A) | _BV(FOC1B)), [tccra] "i"(&TCCR1A), [tccrc] "i"(&TCCR1C),
         [timsk] "i"(&TIMSK1), [line] "M"(static_cast<uint8_t>(hal::Emergency::LINE)),
-        [emergency] "i"(&hal::emergency_seen));
+        [emergency] "i"(&hal::emergency_seen), [joints] "n"(planarm::wire::JOINTS),
+        [scheduled_on] "i"(&hal::scheduled_on), [timsk2] "i"(&TIMSK2));
 }
 
 // The stop input's contact opened: what the last emergency byte does.
 ISR(PCINT1_vect) {
-    if ((PINC & _BV(PINC0)) == 0) return;
-    TCCR1A = _BV(COM1A1) | _BV(COM1B1);
+    if (!hal::read_pin(planarm::wire::STOP_PIN)) return;
+    hal::steps_off();
     TCCR1C = _BV(FOC1A) | _BV(FOC1B);
-    TIMSK1 = 0;
     hal::emergency_seen = static_cast<uint8_t>(hal::Emergency::INPUT);
 }
 

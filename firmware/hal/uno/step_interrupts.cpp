@@ -32,8 +32,16 @@ using planarm::Run;
 using planarm::step_joints;
 using planarm::step_missed;
 
+namespace wire = planarm::wire;
+
+constexpr uint8_t port_of(uint8_t pin) { return static_cast<uint8_t>(hal::port_of(pin)); }
+
 static_assert(static_cast<uint8_t>(Chain::NONE) == 0, "tst finds a joint that goes idle");
 static_assert(static_cast<uint8_t>(Chain::REVERSED) == 2, "bit 1 finds a reversal");
+// An asm takes thirty operands; these are told by their neighbours.
+static_assert(_SFR_MEM_ADDR(TCCR1C) == _SFR_MEM_ADDR(TCCR1A) + 2, "%[tccra] + 2");
+static_assert(_SFR_MEM_ADDR(TCNT1) == _SFR_MEM_ADDR(TCCR1A) + 4, "%[tccra] + 4");
+static_assert(_SFR_MEM_ADDR(TIMSK2) == _SFR_MEM_ADDR(TIMSK1) + 1, "%[timsk] + 1");
 static_assert(sizeof(Run*) == 2 && sizeof(bool) == 1, "widths of loads");
 
 // The first of the joint's two registers for the fraction; the assembler takes registers by number.
@@ -43,6 +51,9 @@ template <uint8_t JOINT>
 HAL_INLINE void step_interrupt() {
     __asm__ __volatile__(
         R"(
+        .if %[by_match]
+        sbi  %[step_port], %[step_bit]  ; rise
+        .endif
         in   r2, %[sreg]
         movw r4, r30
         movw r6, r24
@@ -76,10 +87,19 @@ HAL_INLINE void step_interrupt() {
         adc  r11, r3
         std  Z + %[interval] + 3, r11
         movw r8, r24
+        .if %[by_match]
+        rjmp .+0                        ; the pulse rose 9 cycles after the match
+        rjmp .+0
+        rjmp .+0
+        rjmp .+0
+        rjmp .+0
+        cbi  %[step_port], %[step_bit]  ; fall
+        .else
         ldi  r24, %[foc]                ; fall
-        sts  %[tccrc], r24
-        lds  r24, %[tcnt]               ; late?
-        lds  r25, %[tcnt] + 1
+        sts  %[tccra] + 2, r24
+        .endif
+        lds  r24, %[tccra] + 4               ; late?
+        lds  r25, %[tccra] + 5
         subi r24, lo8(-(%[step_margin]))
         sbci r25, hi8(-(%[step_margin]))
         cp   r8, r24
@@ -110,16 +130,25 @@ HAL_INLINE void step_interrupt() {
         rjmp .+0
         rjmp .+0
         rjmp .+0
+        .if %[by_match]
+        rjmp .+0                        ; the pulse rose 9 cycles after the match
+        rjmp .+0
+        rjmp .+0
+        rjmp .+0
+        rjmp .+0
+        cbi  %[step_port], %[step_bit]  ; fall
+        .else
         ldi  r24, %[foc]                ; fall
-        sts  %[tccrc], r24
+        sts  %[tccra] + 2, r24
+        .endif
         tst  r3
         breq 4f
         sbrc r3, 1
         rjmp 3f
         ldi  r30, lo8(%[step_margin])
         ldi  r31, hi8(%[step_margin])
-    7:  lds  r24, %[tcnt]               ; late?
-        lds  r25, %[tcnt] + 1
+    7:  lds  r24, %[tccra] + 4               ; late?
+        lds  r25, %[tccra] + 5
         add  r24, r30
         adc  r25, r31
         cp   r8, r24
@@ -133,11 +162,19 @@ HAL_INLINE void step_interrupt() {
         reti
 
     5:  lds  r24, %[timsk]              ; a step is missed
+        .if %[joints] > 2
+        lds  r25, %[scheduled_on]
+        or   r24, r25
+        .endif
         sts  %[missed], r24
         ldi  r24, %[all_disarmed]
         sts  %[tccra], r24
         ldi  r24, 0
         sts  %[timsk], r24
+        .if %[joints] > 2
+        sts  %[scheduled_on], r24
+        sts  %[timsk] + 1, r24
+        .endif
         movw r24, r6
         movw r30, r4
         out  %[sreg], r2
@@ -152,10 +189,13 @@ HAL_INLINE void step_interrupt() {
         ldi  r31, hi8(%[dir_margin])
         rjmp 7b
 
-    4:  lds  r24, %[tccra]              ; go idle
+    4:
+        .if !%[by_match]
+        lds  r24, %[tccra]              ; go idle
         andi r24, %[other]
         ori  r24, %[disarmed]
         sts  %[tccra], r24
+        .endif
         lds  r24, %[timsk]
         andi r24, %[silent]
         sts  %[timsk], r24
@@ -170,14 +210,16 @@ HAL_INLINE void step_interrupt() {
         [add] "I"(offsetof(Run, add_q16)), [next] "I"(offsetof(Run, next)),
         [chained] "I"(offsetof(Run, chained)), [first] "I"(offsetof(Run, first_ticks)),
         [dir_high] "I"(offsetof(Run, dir_high)), [ocr] "i"(JOINT == 0 ? &OCR1AL : &OCR1BL),
-        [tccra] "i"(&TCCR1A), [tccrc] "i"(&TCCR1C), [tcnt] "i"(&TCNT1L), [timsk] "i"(&TIMSK1),
-        [foc] "i"(JOINT == 0 ? _BV(FOC1A) : _BV(FOC1B)),
+        [tccra] "i"(&TCCR1A), [timsk] "i"(&TIMSK1), [foc] "i"(JOINT == 0 ? _BV(FOC1A) : _BV(FOC1B)),
         [other] "i"(JOINT == 0 ? _BV(COM1B1) | _BV(COM1B0) : _BV(COM1A1) | _BV(COM1A0)),
-        [disarmed] "i"(JOINT == 0 ? _BV(COM1A1) : _BV(COM1B1)), [all_disarmed] "i"(_BV(COM1A1) | _BV(COM1B1)),
+        [disarmed] "i"(JOINT == 0 ? _BV(COM1A1) : _BV(COM1B1)), [all_disarmed] "i"(hal::ALL_DISARMED),
         [silent] "i"(0xFF & ~(JOINT == 0 ? _BV(OCIE1A) : _BV(OCIE1B))),
         [step_margin] "i"(planarm::step_engine::STEP_MARGIN_TICKS),
-        [dir_margin] "i"(planarm::step_engine::DIR_MARGIN_TICKS), [dir_port] "I"(_SFR_IO_ADDR(PORTD)),
-        [dir_bit] "I"(JOINT == 0 ? PORTD4 : PORTD5), [missed] "i"(&step_missed));
+        [dir_margin] "i"(planarm::step_engine::DIR_MARGIN_TICKS),
+        [dir_port] "I"(port_of(wire::DIR_PINS[JOINT])), [dir_bit] "I"(hal::bit_of(wire::DIR_PINS[JOINT])),
+        [missed] "i"(&step_missed), [by_match] "n"(hal::output<JOINT>() == hal::Output::MATCH ? 1 : 0),
+        [step_port] "I"(port_of(wire::STEP_PINS[JOINT])), [step_bit] "I"(hal::bit_of(wire::STEP_PINS[JOINT])),
+        [joints] "n"(wire::JOINTS), [scheduled_on] "i"(&hal::scheduled_on));
 }
 
 }  // namespace

@@ -5,11 +5,13 @@ Only constants and enumerations: nothing in it takes flash or RAM until it is us
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass
 
+from planarm_wire.boards import Board
 from planarm_wire.generators.text import NOTICE, byte_range, class_name, sentence, wrapped
-from planarm_wire.layout import SCALARS
-from planarm_wire.spec import ENUMS, Code, MessageSpec, Spec, StructSpec
+from planarm_wire.layout import EACH_JOINT, END, SCALARS
+from planarm_wire.spec import ENUMS, Code, FieldSpec, MessageSpec, Spec, StructSpec
 
 _HEAD = """\
 // The wire's numbers and codes. docs/protocol.md tells the rules around them.
@@ -19,12 +21,33 @@ _HEAD = """\
 
 #include <stdint.h>
 
+#include "wiring.h"
+
 namespace planarm {{
 namespace wire {{
 """
 
+_WIRING_HEAD = """\
+{doc}
+//
+// {notice}
+#pragma once
+
+#include <stdint.h>
+
+namespace planarm {{
+namespace wire {{
+
+"""
+
+_WIRING_TAIL = """
+}  // namespace wire
+}  // namespace planarm
+"""
+
+BOARD_LIMITS = ("joints", "queue_bytes", "min_interval_ticks")
+
 _TAIL = """
-static_assert(MAX_FRAME_BYTES <= HOST_WINDOW_BYTES, "the longest frame fits the host's window");
 static_assert(HOST_WINDOW_BYTES < RX_RING_BYTES, "a full window fits the receive ring");
 
 }  // namespace wire
@@ -36,10 +59,6 @@ def messages_h(spec: Spec) -> str:
     """Return the text of messages.h."""
     lines = [_HEAD.format(notice=NOTICE)]
     lines.extend(_constants(spec))
-    lines.append("")
-    lines.extend(_pins("Step outputs, one a joint, as numbered on the board.", "STEP_PINS", spec.board.step_pins))
-    lines.extend(_pins("Direction outputs; high is the positive direction.", "DIR_PINS", spec.board.dir_pins))
-    lines.append(_constant("ENABLE_PIN", "uint8_t", str(_pin(spec.board.enable_pin)), "Active low."))
     codes = ((m.name, m.code, f"From the {m.sender}: {m.doc}") for m in spec.messages)
     lines.extend(_enum("MessageType", "uint8_t", "Type codes of the messages.", codes))
     sections: tuple[tuple[str, str, str, tuple[Code, ...]], ...] = (
@@ -55,6 +74,33 @@ def messages_h(spec: Spec) -> str:
     for message in spec.messages:
         lines.extend(_layout(message, structs))
     return "\n".join(lines) + "\n" + _TAIL
+
+
+def wiring_h(board: Board) -> Callable[[Spec], str]:
+    """Return what makes the text of a board's wiring.h."""
+
+    def text(spec: Spec) -> str:
+        (wired,) = (one for one in spec.boards if one.name == board.name)
+        code = {entry.name: entry.code for entry in spec.pin_maps}[wired.pin_map]
+        docs = {limit.name: limit.doc.removeprefix("of the board uno: ") for limit in spec.limits}
+        parts = [
+            _WIRING_HEAD.format(
+                doc=wrapped(f"The board {wired.name}: {sentence(wired.doc)}", "// ", 100), notice=NOTICE
+            )
+        ]
+        parts.append(_constant("JOINTS", "uint8_t", str(wired.joints), "Joints that segments and ledger tell of."))
+        for name in ("queue_bytes", "min_interval_ticks"):
+            value = getattr(wired, name)
+            parts.append(_constant(name.upper(), _type(value), str(value), docs[name].split(",")[0]))
+        parts.append(_constant("PIN_MAP_CODE", "uint8_t", str(code), f"The pin map {wired.pin_map}."))
+        parts.extend(_pins("Step outputs, one a joint, as numbered on the board.", "STEP_PINS", wired.step_pins))
+        parts.extend(_pins("Direction outputs; high is the positive direction.", "DIR_PINS", wired.dir_pins))
+        parts.extend(_pins("Limit switches, to ground.", "LIMIT_PINS", wired.limit_pins))
+        parts.append(_constant("ENABLE_PIN", "uint8_t", str(_pin(wired.enable_pin)), "Active low."))
+        parts.append(_constant("STOP_PIN", "uint8_t", str(_pin(wired.stop_pin)), "The stop input, to ground."))
+        return "\n".join(parts).replace("\n\n\n", "\n\n") + "\n" + _WIRING_TAIL
+
+    return text
 
 
 def _constants(spec: Spec) -> Iterator[str]:
@@ -80,6 +126,8 @@ def _constants(spec: Spec) -> Iterator[str]:
     )
     yield ""
     for limit in spec.limits:
+        if limit.name in BOARD_LIMITS:
+            continue
         yield _constant(limit.name.upper(), _type(limit.value), str(limit.value), limit.doc)
 
 
@@ -118,29 +166,67 @@ def _layout(message: MessageSpec, structs: Mapping[str, StructSpec]) -> Iterator
     name = message.name.upper()
     yield f"\n// {class_name(message.name)}: payload of {byte_range(message.min_bytes, message.max_bytes)}."
     if message.min_bytes != message.max_bytes:
-        yield f"constexpr uint8_t {name}_MIN_BYTES = {message.min_bytes};"
+        yield f"constexpr uint8_t {name}_MIN_BYTES = {_size_of(message, structs, least=True)};"
         return
-    yield f"constexpr uint8_t {name}_BYTES = {message.max_bytes};"
+    yield f"constexpr uint8_t {name}_BYTES = {_size_of(message, structs)};"
     if not message.fields:
         return
     yield f"namespace {message.name}_at {{"
-    rows = [(f"constexpr uint8_t {f.upper()} = {at};", kind) for f, kind, at in _offsets(message, structs, "", 0)]
+    rows = [(f"constexpr uint8_t {f.upper()} = {at};", kind) for f, kind, at in _offsets(message, structs, "", Bytes())]
     width = max(len(row) for row, _ in rows)
     for row, kind in rows:
         yield f"{row:{width}}  // {kind}"
     yield f"}}  // namespace {message.name}_at"
 
 
+@dataclass(frozen=True, slots=True)
+class Bytes:
+    """A number of bytes that depends on the board's joints."""
+
+    fixed: int = 0
+    a_joint: int = 0
+
+    def __add__(self, more: Bytes) -> Bytes:
+        return Bytes(self.fixed + more.fixed, self.a_joint + more.a_joint)
+
+    def repeated(self, field: FieldSpec) -> Bytes:
+        """Return these bytes as often as the field stands there."""
+        if field.count == EACH_JOINT:
+            return Bytes(0, self.fixed)
+        times = 1 if field.count is None or field.count == END else field.count
+        return Bytes(times * self.fixed, times * self.a_joint)
+
+    def __str__(self) -> str:
+        if not self.a_joint:
+            return str(self.fixed)
+        return f"{self.fixed} + {self.a_joint} * JOINTS" if self.fixed else f"{self.a_joint} * JOINTS"
+
+
+def _field_size(field: FieldSpec, structs: Mapping[str, StructSpec], least: bool) -> Bytes:
+    if field.kind in SCALARS:
+        scalar = SCALARS[field.kind]
+        one = Bytes(scalar.min_bytes if least else scalar.max_bytes)
+    else:
+        one = _size_of(structs[field.kind], structs, least=least)
+    return Bytes() if least and field.when else one.repeated(field)
+
+
+def _size_of(item: MessageSpec | StructSpec, structs: Mapping[str, StructSpec], *, least: bool = False) -> Bytes:
+    total = Bytes()
+    for field in item.fields:
+        total += _field_size(field, structs, least)
+    return total
+
+
 def _offsets(
-    item: MessageSpec | StructSpec, structs: Mapping[str, StructSpec], prefix: str, offset: int
-) -> Iterator[tuple[str, str, int]]:
+    item: MessageSpec | StructSpec, structs: Mapping[str, StructSpec], prefix: str, offset: Bytes
+) -> Iterator[tuple[str, str, Bytes]]:
     for field in item.fields:
         name = f"{prefix}{field.name}"
-        times = field.count or 1
-        kind = f"{field.kind} x {times}" if field.count else field.kind
         if field.kind in SCALARS:
+            times = "JOINTS" if field.count == EACH_JOINT else field.count
+            kind = f"{field.kind} x {times}" if field.count else field.kind
             yield name, f"{kind}{'' if field.unit == '1' else ', ' + field.unit}", offset
-            offset += SCALARS[field.kind].max_bytes * times
         else:
             yield from _offsets(structs[field.kind], structs, f"{name}_", offset)
-            offset += structs[field.kind].max_bytes * times
+        offset += _field_size(field, structs, least=False)

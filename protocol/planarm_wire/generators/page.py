@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 
+from planarm_wire.boards import Board
 from planarm_wire.generators.text import NOTICE, byte_range, count_words, presence, sentence
 from planarm_wire.layout import SCALARS
 from planarm_wire.spec import Code, FieldSpec, Framing, MessageSpec, Spec, StructSpec
@@ -107,7 +108,7 @@ def protocol_md(spec: Spec) -> str:
             ("name", "value", "meaning"),
             ((limit.name, f"{limit.value:,}", sentence(limit.doc)) for limit in spec.limits),
         ),
-        "Board": _board(spec),
+        "Boards": _boards(spec),
         "States": _table(("code", "name", "meaning"), ((str(c.code), c.name, sentence(c.text)) for c in spec.states)),
         "Faults": _codes(spec.faults),
         "Resets": _table(("code", "name", "meaning"), ((str(c.code), c.name, sentence(c.text)) for c in spec.resets)),
@@ -198,13 +199,20 @@ def _codes(codes: Iterable[Code]) -> str:
     )
 
 
-def _board(spec: Spec) -> str:
-    board = spec.board
-    rows: Iterator[tuple[str, str, str]] = (
-        (str(joint), step, direction)
-        for joint, (step, direction) in enumerate(zip(board.step_pins, board.dir_pins, strict=True), start=1)
+def _boards(spec: Spec) -> str:
+    return "\n\n".join(_board(board, spec.limit("ticks_hz")) for board in spec.boards)
+
+
+def _board(board: Board, ticks_hz: int) -> str:
+    pins = zip(board.step_pins, board.dir_pins, board.limit_pins, strict=True)
+    rows = ((str(joint), *names) for joint, names in enumerate(pins, start=1))
+    least = board.min_interval_ticks
+    return (
+        f"### {board.name}\n\n{sentence(board.doc)} Pin map {board.pin_map}; a queue of {board.queue_bytes} bytes; "
+        f"at least {least:,} ticks between two steps of a joint, {ticks_hz // least:,} steps/s. "
+        f"ENABLE is {board.enable_pin}, the stop input {board.stop_pin}.\n\n"
+        + _table(("joint", "STEP", "DIR", "limit switch"), rows)
     )
-    return f"{sentence(board.doc)} ENABLE is {board.enable_pin}.\n\n" + _table(("joint", "STEP", "DIR"), rows)
 
 
 def _table(head: tuple[str, ...], rows: Iterable[tuple[str, ...]]) -> str:

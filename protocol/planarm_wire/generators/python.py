@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 
+from planarm_wire.boards import Board
 from planarm_wire.generators.text import NOTICE, byte_range, class_name, presence, sentence, wrapped
-from planarm_wire.layout import END, SCALARS
+from planarm_wire.layout import EACH_JOINT, END, SCALARS
 from planarm_wire.spec import ENUMS, Code, FieldSpec, MessageSpec, Spec, StructSpec
 
 _HEAD = '''"""The wire's numbers, words and messages.
@@ -19,7 +20,8 @@ from dataclasses import dataclass
 from enum import IntEnum
 from typing import ClassVar, Final, NamedTuple, TypeAlias
 
-from planarm_wire.layout import END, Field
+from planarm_wire.boards import Board
+from planarm_wire.layout import EACH_JOINT, END, Field
 
 '''
 
@@ -64,7 +66,7 @@ def _type_codes(spec: Spec) -> Iterator[tuple[str, int, str]]:
 
 
 def _constants(spec: Spec) -> Iterator[str]:
-    framing, board = spec.framing, spec.board
+    framing, board = spec.framing, spec.boards[0]
     yield _constant("PROTOCOL_VERSION", str(spec.version), "Both ends must have the same.")
     yield _constant("SPEC_HASH", f"0x{spec.spec_hash:08X}", "Hash of the specification without its wording.")
     yield _constant("DELIMITER", f"0x{framing.delimiter:02X}", "Ends every frame.")
@@ -82,9 +84,24 @@ def _constants(spec: Spec) -> Iterator[str]:
     yield _constant("MAX_PAYLOAD_BYTES", str(framing.max_payload_bytes), "Before stuffing.")
     for limit in spec.limits:
         yield _constant(limit.name.upper(), f"{limit.value:_}", limit.doc)
-    yield _constant("STEP_PINS", _strings(board.step_pins), "One a joint; the step is the rising edge.")
-    yield _constant("DIR_PINS", _strings(board.dir_pins), "One a joint; high is the positive direction.")
+    yield _constant(
+        "STEP_PINS", _strings(board.step_pins), f"Of {board.name}, one a joint; the step is the rising edge."
+    )
+    yield _constant("DIR_PINS", _strings(board.dir_pins), f"Of {board.name}, one a joint; high is positive.")
     yield _constant("ENABLE_PIN", f'"{board.enable_pin}"', "Active low.")
+    rows = "".join(_board(board) for board in spec.boards)
+    yield f'BOARDS: Final[dict[str, Board]] = {{\n{rows}}}\n"""By name; each has a flash image."""\n'
+
+
+def _board(board: Board) -> str:
+    rows = "".join(f"        {name}={_literal(getattr(board, name))},\n" for name in Board.__slots__)
+    return f'    "{board.name}": Board(\n{rows}    ),\n'
+
+
+def _literal(value: object) -> str:
+    if isinstance(value, tuple):
+        return _strings(value)
+    return f"{value:_}" if isinstance(value, int) else f'"{value}"'
 
 
 def _strings(items: Iterable[str]) -> str:
@@ -142,7 +159,7 @@ def _dataclass(item: StructSpec | MessageSpec) -> str:
         lines.append(f"    {field.name}: {_annotation(field)}{default}\n")
         notes = [field.unit if field.unit not in ("", "1") else "", field.kind, presence(field)]
         if field.count is not None and field.count != END:
-            notes[1] = f"{field.count} x {field.kind}"
+            notes[1] = f"{'joints' if field.count == EACH_JOINT else field.count} x {field.kind}"
         lines.append(_docstring(f"{sentence(field.doc)} ({', '.join(filter(None, notes))})", "    "))
     return "".join(lines)
 
@@ -194,7 +211,8 @@ def _field(field: FieldSpec) -> str:
     kind = f'"{field.kind}"' if field.kind in SCALARS else class_name(field.kind)
     parts = [f'"{field.name}"', kind]
     if field.count is not None:
-        parts.append(f"repeat={'END' if field.count == END else field.count}")
+        words = {END: "END", EACH_JOINT: "EACH_JOINT"}
+        parts.append(f"repeat={words.get(field.count, field.count)}")
     if field.when is not None:
         parts.append(f'when=("{field.when[0]}", {field.when[1]})')
     if field.enum is not None:

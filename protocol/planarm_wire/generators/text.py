@@ -6,7 +6,7 @@ import re
 import textwrap
 from typing import Final
 
-from planarm_wire.layout import END
+from planarm_wire.layout import EACH_JOINT, END
 from planarm_wire.spec import FieldSpec
 
 NOTICE: Final = "Generated from protocol/messages.toml by `python -m planarm_wire.generate`; do not edit."
@@ -49,4 +49,6 @@ def count_words(field: FieldSpec) -> str:
         return ""
     if field.count == END:
         return "one or more, to the payload's end"
+    if field.count == EACH_JOINT:
+        return "one a joint"
     return f"{field.count} times" + ("" if field.repeat.isdigit() else f" ({field.repeat})")

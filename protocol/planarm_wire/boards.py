@@ -1,0 +1,31 @@
+"""What the flash images differ in: the joints they step, the pins these are wired to, and how fast they may go."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, slots=True)
+class Board:
+    """A wiring of the Uno; the image of its name is made for it. Pins are named as printed on the board."""
+
+    name: str
+    doc: str
+    pin_map: str
+    """A name of the wire's pin maps."""
+    joints: int
+    """Entries of every field that is there for each joint."""
+    queue_bytes: int
+    """What the firmware holds of queued segments."""
+    min_interval_ticks: int
+    """Least time between two steps of one joint."""
+    step_pins: tuple[str, ...]
+    """One a joint; the step is the rising edge."""
+    dir_pins: tuple[str, ...]
+    """One a joint; high is the positive direction."""
+    enable_pin: str
+    """Active low."""
+    stop_pin: str
+    """The stop input, closed to ground while all is well."""
+    limit_pins: tuple[str, ...]
+    """One a joint."""

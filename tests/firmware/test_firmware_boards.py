@@ -1,0 +1,250 @@
+"""The images of the other boards on the emulated Uno: four joints, and the Arduino CNC shield."""
+
+from __future__ import annotations
+
+import itertools
+import math
+import random
+from fractions import Fraction
+from pathlib import Path
+
+import pytest
+
+from firmware_board import LEAD_TICKS, WAKE_TICKS, Board, EmulatedFirmware, Schedule, end_motion, run_of, segment_of
+from firmware_motions import fast_moves
+from firmware_tracer import SCHEDULED, Tracer
+from planarm_wire.codec import encode
+from planarm_wire.framing import encode_frame
+from planarm_wire.messages import (
+    BOARDS,
+    DELIMITER,
+    EMERGENCY_CODE,
+    HOLD_CODE,
+    HOST_WINDOW_BYTES,
+    MIN_DIR_SETUP_TICKS,
+    MIN_STEP_HIGH_TICKS,
+    MIN_STEP_LOW_TICKS,
+    SLICE_TICKS,
+    TICKS_HZ,
+    Config,
+    Enable,
+    Fault,
+    PinMap,
+    Result,
+    Resume,
+    Segment,
+    Segments,
+    Start,
+    State,
+    Status,
+)
+
+RELEASE = Path(__file__).parents[2] / "firmware" / "release"
+OTHERS = ["uno_four", "cnc_shield", "cnc_shield_four"]
+FIFTEEN_K = TICKS_HZ // 15_000
+# Largest distance of a rise from its tick: 0 on a compare output, 12 us of joints 3 and 4; on the shield what may run
+# when a step of joint 1 or 2 is due.
+MOST_OFF_TICKS = {"uno_four": (0, 0, 192, 192), "cnc_shield": (160, 160), "cnc_shield_four": (480, 480, 192, 192)}
+LOOK_CYCLES, ONE_STEP_CYCLES, BOTH_CYCLES = (62, 76), (127, 210), (286, 288)
+
+
+def emulated(name: str) -> EmulatedFirmware:
+    return EmulatedFirmware(RELEASE / f"{name}.hex", BOARDS[name])
+
+
+def steady(name: str, interval: int, seconds: float) -> list[Segment]:
+    """All joints at nearly one interval, each a little slower than the one before it, so that all phases occur."""
+    joints = BOARDS[name].joints
+    duration = 8 * SLICE_TICKS
+    intervals = [round(256 * interval * ratio) for ratio in (1.0, 1.0037, 1.0071, 1.0113)[:joints]]
+    begun_at = [Fraction(7 * joint) for joint in range(joints)]
+    segments = []
+    for _ in range(math.ceil(seconds * TICKS_HZ / duration)):
+        moves, begun_at = zip(
+            *(
+                fast_moves(duration, Fraction(math.ceil(at)), each)
+                for at, each in zip(begun_at, intervals, strict=True)
+            ),
+            strict=True,
+        )
+        segments.append(segment_of(duration, *moves, joints=joints))
+    return end_motion(segments)
+
+
+def restless(name: str, seed: int, count: int) -> list[Segment]:
+    """Joints that turn round, rest, crawl and run, each for itself."""
+    board, chance = BOARDS[name], random.Random(seed)
+    segments = []
+    for _ in range(count):
+        moves = []
+        for _ in range(board.joints):
+            interval = chance.choice([board.min_interval_ticks + 20, 1500, 4000, 20_000, 50_000])
+            steps = chance.randint(0, (200_000 - 3000) // interval)
+            moves.append(run_of(steps, first=1500, interval=interval, positive=chance.random() < 0.5))
+        segments.append(segment_of(200_000, *moves, joints=board.joints))
+    return end_motion(segments)
+
+
+def assert_near_schedule(board: Board, name: str, motion: list[Segment], status: Status) -> None:
+    """No fault, every step made, none farther from its tick than allowed, every driver's rule kept."""
+    assert (status.state, status.fault, status.overruns) == (State.READY, Fault.NONE, 0)
+    schedule, wiring = Schedule.of(motion), board.wiring
+    assert status.ledger.position_usteps == schedule.positions()
+    first = [steps[0][0] for steps in schedule.steps]
+    begin = min(board.rises(0)[0] - first[0], board.rises(1)[0] - first[1])
+    for joint, steps in enumerate(schedule.steps):
+        rises = board.rises(joint)
+        off = [rise - begin - tick for rise, (tick, _) in zip(rises, steps, strict=True)]
+        assert max(map(abs, off)) <= MOST_OFF_TICKS[name][joint], f"joint {joint + 1}: {min(off)} to {max(off)}"
+        assert board.position_at(joint, board.now) == schedule.positions()[joint], "by the pins"
+        edges = [edge for edge in board.edges if edge.pin == wiring.step_pins[joint]]
+        for earlier, later in itertools.pairwise(edges):
+            least = MIN_STEP_HIGH_TICKS if earlier.level else MIN_STEP_LOW_TICKS
+            assert later.tick - earlier.tick >= least, f"joint {joint + 1}"
+        turns = [edge.tick for edge in board.edges if edge.pin == wiring.dir_pins[joint]]
+        for edge in edges:
+            away = [abs(edge.tick - turn) for turn in turns if edge.level and turn <= edge.tick]
+            assert not away or min(away) >= MIN_DIR_SETUP_TICKS, f"joint {joint + 1}"
+
+
+@pytest.mark.parametrize("name", OTHERS)
+def test_pins_are_quiet_from_reset_on(name: str) -> None:
+    wiring = BOARDS[name]
+    uno = emulated(name).uno
+    uno.reset()
+    uno.run(cycles=600_000)
+    assert uno.pin(wiring.enable_pin).level == 1
+    assert [len(uno.edges(pin)) for pin in (*wiring.step_pins, *wiring.dir_pins)] == [0] * 2 * wiring.joints
+    assert all(uno.pin(pin).level == 1 for pin in (*wiring.limit_pins, wiring.stop_pin)), "pulled up"
+
+
+@pytest.mark.parametrize("name", OTHERS)
+def test_all_joints_at_their_rate_on_a_saturated_line(name: str) -> None:
+    interval = max(BOARDS[name].min_interval_ticks, FIFTEEN_K if BOARDS[name].joints == 4 else 0)
+    motion = steady(name, interval, 0.5)
+    firmware = emulated(name)
+    board = Board(firmware)
+    board.get_ready()
+    queued = motion[:8]
+    motion = end_motion(queued)
+    for segment in motion:
+        board.ask(Segments(0, 0, 0, (segment,)))
+    board.ask(Start(LEAD_TICKS))
+    frame = encode_frame(board.seq - 1, *encode(Segments(0, 0, 0, (motion[0],))))
+    end = board.now + LEAD_TICKS + 8 * 8 * SLICE_TICKS + 100_000
+    while board.now < end:
+        while firmware.uno.serial.pending < HOST_WINDOW_BYTES:
+            board.receive(frame)
+        board.run(20_000)
+    board.run(200_000)
+    board.receive(bytes([DELIMITER]))
+    assert_near_schedule(board, name, motion, board.ask())
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+@pytest.mark.parametrize("name", OTHERS)
+def test_a_random_motion_of_all_joints(name: str, seed: int) -> None:
+    motion = restless(name, seed, 60)
+    board = Board(emulated(name))
+    board.get_ready()
+    assert_near_schedule(board, name, motion, board.stream(motion))
+
+
+@pytest.mark.parametrize("name", OTHERS)
+def test_a_hold_rests_on_the_path_and_loses_nothing(name: str) -> None:
+    motion = steady(name, 6000, 0.5)
+    board = Board(emulated(name))
+    joints = BOARDS[name].joints
+    board.hello()
+    board.ask(Config(PinMap[BOARDS[name].pin_map.upper()], joints, 0, 0, 0, 0, 0, (20_000,) * joints))
+    board.ask(Enable(1))
+    board.run(WAKE_TICKS)
+    for segment in motion[:8]:
+        board.ask(Segments(200, 200, 1, (segment,)))
+    board.ask(Start(LEAD_TICKS))
+    board.run(400_000)
+    board.receive(bytes([HOLD_CODE]))
+    board.run(2_000_000)
+    held = board.ask_now()
+    assert held.state is State.HELD
+    made = held.ledger.position_usteps
+    assert made == tuple(board.position_at(joint, board.now) for joint in range(joints))
+    board.send(Resume())
+    board.run(20 * 8 * SLICE_TICKS)
+    status = board.ask_now()
+    assert status.fault is Fault.UNDERRUN, "the motion's last segment was not sent"
+    assert status.ledger.position_usteps == Schedule.of(motion[:8]).positions()
+    assert status.ledger.position_usteps == tuple(board.position_at(joint, board.now) for joint in range(joints))
+
+
+@pytest.mark.parametrize("name", OTHERS)
+def test_an_emergency_stop_ends_all_pulses(name: str) -> None:
+    motion = steady(name, 2000, 0.3)
+    board = Board(emulated(name))
+    board.get_ready()
+    for segment in motion[:6]:
+        board.ask(Segments(0, 0, 0, (segment,)))
+    board.ask(Start(LEAD_TICKS))
+    board.run(400_000)
+    board.receive(bytes([EMERGENCY_CODE] * 3))
+    stop_bit = board.now + 3 * 640
+    board.run(200_000)
+    assert max(edge.tick for edge in board.motion_edges()) <= stop_bit + 480, "30 us"
+    assert not any(board._firmware.uno.pin(pin).level for pin in BOARDS[name].step_pins)
+    assert board.ask().fault is Fault.EMERGENCY_STOP
+
+
+@pytest.mark.parametrize("name", OTHERS)
+def test_another_boards_wiring_is_refused(name: str) -> None:
+    board = Board(emulated(name))
+    board.hello()
+    joints = BOARDS[name].joints
+    own, other = (PinMap.OWN, PinMap.CNC_SHIELD) if BOARDS[name].pin_map == "own" else (PinMap.CNC_SHIELD, PinMap.OWN)
+    assert board.ask(Config(own, joints, 0, 0, 0, 0, 0, (4000,) * joints)).refusal is Result.OK
+    assert board.ask(Config(other, joints, 0, 0, 0, 0, 0, (4000,) * joints)).refusal is Result.OUT_OF_RANGE
+
+
+def test_a_step_too_late_of_a_scheduled_joint_stops_all_joints() -> None:
+    motion = steady("uno_four", 1100, 0.2)
+    tracer = Tracer(RELEASE / "uno_four.hex", BOARDS["uno_four"])
+    board = Board(tracer)
+    fast = super(Tracer, tracer).run
+    tracer.run = fast  # type: ignore[method-assign]
+    board.get_ready()
+    for segment in motion[:4]:
+        board.ask(Segments(0, 0, 0, (segment,)))
+    board.send(Start(LEAD_TICKS))
+    board.run(LEAD_TICKS + 60_000)
+    tracer.hold_interrupts(2500)
+    board.run(200_000)
+    status = board.ask()
+    assert status.fault is Fault.MISSED_DEADLINE
+    made = tuple(board.position_at(joint, board.now) for joint in range(4))
+    assert status.ledger.position_usteps == made
+
+
+def test_cycles_of_the_scheduled_interrupt() -> None:
+    def turning(positive: bool) -> Segment:
+        moves = [run_of(20, first=2500, interval=2500, positive=positive)] * 2
+        return segment_of(60_000, run_of(0), run_of(0), *moves, joints=4)
+
+    def apart(positive: bool) -> Segment:
+        moves = [run_of(20, first=first, interval=2500, positive=positive) for first in (2500, 3700)]
+        return segment_of(60_000, run_of(0), run_of(0), *moves, joints=4)
+
+    tracer = Tracer(RELEASE / "uno_four.hex", BOARDS["uno_four"])
+    board = Board(tracer)
+    fast = super(Tracer, tracer).run
+    tracer.run = fast  # type: ignore[method-assign]
+    board.get_ready()
+    slow = segment_of(60_000, run_of(0), run_of(0), run_of(3, interval=20_000), joints=4)
+    for segment in end_motion([turning(True), turning(False), apart(True), apart(False), slow]):
+        board.ask(Segments(0, 0, 0, (segment,)))
+    board.send(Start(LEAD_TICKS))
+    board.run(LEAD_TICKS - 4000)
+    del tracer.run
+    board.run(320_000)
+    taken = sorted(tracer.taken(SCHEDULED))
+    groups = [[c for c in taken if low <= c <= high] for low, high in (LOOK_CYCLES, ONE_STEP_CYCLES, BOTH_CYCLES)]
+    assert all(groups)
+    assert sum(map(len, groups)) == len(taken), taken

@@ -1,0 +1,53 @@
+"""The emulated board run instruction by instruction, so that every interrupt's cycles are counted."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+from firmware_board import UNO, EmulatedFirmware
+from planarm_wire.boards import Board as Wiring
+
+SCHEDULED, STEP_1, STEP_2, RECEIVE, TRANSMIT = 7, 11, 12, 18, 19  # numbers of the vectors, from 0
+ENTRY_CYCLES = 4
+INTERRUPTS_ON = 0x80
+
+
+class Tracer(EmulatedFirmware):
+    """The emulated board, run by single instructions; notes (vector, cycles) of every interrupt."""
+
+    def __init__(self, image: Path, wiring: Wiring = UNO) -> None:
+        super().__init__(image, wiring)
+        self.chip = self.uno._chip
+        self.done: list[tuple[int, int]] = []
+
+    def run(self, ticks: int) -> None:
+        end = self.uno.cycle + ticks
+        while self.uno.cycle < end:
+            self._step()
+        super().run(0)  # takes over what came on pins and line
+
+    def run_until(self, condition: Callable[[], bool]) -> None:
+        while not condition():
+            self._step()
+
+    def hold_interrupts(self, ticks: int) -> None:
+        """Let the main program run on for a while as if it had switched interrupts off."""
+        self.chip.sreg &= ~INTERRUPTS_ON
+        self.uno.run(cycles=ticks)
+        self.chip.sreg |= INTERRUPTS_ON
+
+    def taken(self, vector: int) -> set[int]:
+        return {cycles for number, cycles in self.done if number == vector}
+
+    def _step(self) -> None:
+        chip = self.chip
+        depth = chip.sp
+        chip.run_to(chip.cycle + 1)
+        if chip.pc % 2 or not SCHEDULED <= chip.pc // 2 <= TRANSMIT:
+            return
+        vector, begun = chip.pc // 2, chip.cycle - ENTRY_CYCLES
+        assert chip.sp == depth - 2
+        while chip.sp < depth:
+            chip.run_to(chip.cycle + 1)
+        self.done.append((vector, chip.cycle - begun))
