@@ -359,7 +359,7 @@ class Schedule:
     @classmethod
     def of(cls, segments: Sequence[Segment]) -> Schedule:
         ends = list(itertools.accumulate(duration_ticks(segment) for segment in segments))
-        steps: tuple[list[tuple[int, int]], ...] = tuple([] for _ in segments[0].moves)
+        steps: tuple[list[tuple[int, int]], ...] = tuple([] for _ in (segments[0].moves if segments else UNO.step_pins))
         for segment, start in zip(segments, [0, *ends], strict=False):
             for joint, ticks in enumerate(expand_moves(segment)):
                 steps[joint].extend((start + tick, direction(segment.moves[joint])) for tick in ticks)

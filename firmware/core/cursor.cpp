@@ -90,13 +90,14 @@ uint8_t Cursor::steps_before(uint16_t path_ticks, bool ends_segment, Fixed48& to
     for (;;) {
         const int32_t room = static_cast<int32_t>(path_ticks - ticks_to(to_last));
         if (room > 0) {
-            uint16_t more = static_cast<uint16_t>(static_cast<uint16_t>(room) /
-                                                  (static_cast<uint16_t>(interval >> 16) + 1u));
+            if (steps == most) return steps;
+            // Rounded so that at one interval the last of these steps is still before the border.
+            const uint16_t whole = static_cast<uint16_t>(interval >> 16);
+            uint16_t more = static_cast<uint16_t>(static_cast<uint16_t>(room - 1) / (whole + 1u));
             if (more > static_cast<uint8_t>(most - steps)) more = static_cast<uint8_t>(most - steps);
-            Fixed48 time = more < 2 ? Fixed48{interval >> 16, static_cast<uint16_t>(interval)}
+            Fixed48 time = more < 2 ? Fixed48{whole, static_cast<uint16_t>(interval)}
                                     : run_time(static_cast<uint8_t>(more), interval, add_q16_);
             if (more == 0) {
-                if (steps == most) return steps;
                 more = 1;
                 Fixed48 next = to_last;
                 add_to(next, time);
