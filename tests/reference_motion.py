@@ -12,8 +12,8 @@ from planarm.stepping.quantise import quantise
 from planarm.stepping.train import StepTrain
 from planarm.trajectory.timing import time_path
 from planarm_wire.codec import encoded_bytes
-from planarm_wire.messages import MAX_PAYLOAD_BYTES, QUEUE_BYTES, QUEUE_FRAME_BYTES, Segment, Segments
-from planarm_wire.rates import MESSAGE_SEGMENTS
+from planarm_wire.messages import QUEUE_BYTES, QUEUE_FRAME_BYTES, Segment, Segments
+from planarm_wire.rates import MESSAGE_SEGMENTS, SHARED_PAYLOAD_BYTES
 from planarm_wire.steps import duration_ticks
 
 REFERENCE = Path(__file__).parent / "data" / "reference_motion.toml"
@@ -47,7 +47,7 @@ def least_held_ticks(segments: Sequence[Segment]) -> int:
         used, at = 0, begin
         while at < len(segments):
             pair = sum(sizes[at : at + MESSAGE_SEGMENTS])
-            count = MESSAGE_SEGMENTS if head + pair <= MAX_PAYLOAD_BYTES else 1
+            count = MESSAGE_SEGMENTS if head + pair <= SHARED_PAYLOAD_BYTES else 1
             used += head + sum(sizes[at : at + count]) + QUEUE_FRAME_BYTES
             if used > QUEUE_BYTES:
                 least = min(least, sum(map(duration_ticks, segments[begin:at])))

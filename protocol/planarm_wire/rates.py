@@ -16,7 +16,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Final
 
-from planarm_wire.messages import NEED_UNIT_TICKS, TICKS_HZ
+from planarm_wire.messages import HOST_WINDOW_BYTES, NEED_UNIT_TICKS, TICKS_HZ
 
 RATE_UNIT_PER_S: Final = TICKS_HZ / 2**32
 """What v = 1 means, 0.0037 1/s."""
@@ -24,6 +24,8 @@ MAX_CODE: Final = 0xFF
 MANTISSAS: Final = 16
 MESSAGE_SEGMENTS: Final = 2
 """Most segments that hosts put into one message: its head, the least of their allowances, holds for all of them."""
+SHARED_PAYLOAD_BYTES: Final = HOST_WINDOW_BYTES // 2 - 8
+"""Longest payload of a message with several segments: its frame takes half of the window. One segment may take more."""
 
 
 def rate_value(code: int) -> int:

@@ -41,7 +41,7 @@ from planarm_wire.messages import (
 
 RELEASE = Path(__file__).parents[2] / "firmware" / "release"
 OTHERS = ["uno_four", "cnc_shield", "cnc_shield_four"]
-FIFTEEN_K = TICKS_HZ // 15_000
+FIFTEEN_K, TWELVE_K = TICKS_HZ // 15_000, TICKS_HZ // 12_500
 # Largest distance of a rise from its tick: 0 on a compare output, 12 us of joints 3 and 4; on the shield what may run
 # when a step of joint 1 or 2 is due.
 MOST_OFF_TICKS = {"uno_four": (0, 0, 192, 192), "cnc_shield": (160, 160), "cnc_shield_four": (480, 480, 192, 192)}
@@ -120,7 +120,7 @@ def test_pins_are_quiet_from_reset_on(name: str) -> None:
 
 @pytest.mark.parametrize("name", OTHERS)
 def test_all_joints_at_their_rate_on_a_saturated_line(name: str) -> None:
-    interval = max(BOARDS[name].min_interval_ticks, FIFTEEN_K if BOARDS[name].joints == 4 else 0)
+    interval = max(BOARDS[name].min_interval_ticks, TWELVE_K if BOARDS[name].joints == 4 else 0)
     motion = steady(name, interval, 0.5)
     firmware = emulated(name)
     board = Board(firmware)
@@ -139,6 +139,13 @@ def test_all_joints_at_their_rate_on_a_saturated_line(name: str) -> None:
     board.run(200_000)
     board.receive(bytes([DELIMITER]))
     assert_near_schedule(board, name, motion, board.ask())
+
+
+def test_four_joints_at_15_000_steps_a_second() -> None:
+    motion = steady("uno_four", FIFTEEN_K, 0.5)
+    board = Board(emulated("uno_four"))
+    board.get_ready()
+    assert_near_schedule(board, "uno_four", motion, board.stream(motion))
 
 
 @pytest.mark.parametrize("seed", [1, 2])

@@ -20,11 +20,11 @@ from planarm_wire.messages import (
     CRC_BYTES,
     HEADER_BYTES,
     HOST_WINDOW_BYTES,
-    MAX_PAYLOAD_BYTES,
     QUEUE_BYTES,
     SLICE_TICKS,
     TICKS_HZ,
 )
+from planarm_wire.rates import SHARED_PAYLOAD_BYTES
 
 BITS_PER_BYTE = 10
 """On the line: start bit, eight bits, stop bit."""
@@ -67,7 +67,7 @@ def _check_load(made: StepTrain) -> Check:
 
 def _share_of_frame(table: SegmentTable) -> Floats:
     """Return each segment's share of its frame: half where the frame is sure to hold two of its size."""
-    return np.where(2 * segment_bytes(table) + QUEUED_HEAD_BYTES <= MAX_PAYLOAD_BYTES, 0.5, 1.0)
+    return np.where(2 * segment_bytes(table) + QUEUED_HEAD_BYTES <= SHARED_PAYLOAD_BYTES, 0.5, 1.0)
 
 
 def _frame_bytes(table: SegmentTable) -> Floats:

@@ -33,7 +33,7 @@ from planarm_wire.messages import (
     SLICE_TICKS,
     TICKS_HZ,
 )
-from planarm_wire.rates import MESSAGE_SEGMENTS
+from planarm_wire.rates import MESSAGE_SEGMENTS, SHARED_PAYLOAD_BYTES
 
 JUST_BEFORE_S = 1e-9
 """Accelerations jump at gridpoints; they are looked at on both sides."""
@@ -186,7 +186,7 @@ def queued_bytes(segment_bytes: Ticks) -> Ticks:
 
     Two share a frame where both are short enough, stuffed bytes included; else each has its own.
     """
-    alone = MESSAGE_SEGMENTS * segment_bytes + HEAD_BYTES > MAX_PAYLOAD_BYTES
+    alone = MESSAGE_SEGMENTS * segment_bytes + HEAD_BYTES > SHARED_PAYLOAD_BYTES
     return np.asarray(segment_bytes + np.where(alone, HEAD_BYTES, HEAD_BYTES // MESSAGE_SEGMENTS))
 
 
