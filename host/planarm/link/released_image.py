@@ -5,18 +5,19 @@ from pathlib import Path
 from planarm.errors import LinkError
 
 _PACKAGE = Path(__file__).resolve().parents[1]
-_PLACES = (
-    _PACKAGE / "released" / "uno.hex",  # installed wheel
-    _PACKAGE.parents[1] / "firmware" / "release" / "uno.hex",  # checkout
+_FOLDERS = (
+    _PACKAGE / "released",  # installed wheel
+    _PACKAGE.parents[1] / "firmware" / "release",  # checkout
 )
 
 
-def released_image() -> Path:
-    """Path of the released image (Intel HEX); a LinkError names the places where it was looked for."""
-    for place in _PLACES:
+def released_image(board: str = "uno") -> Path:
+    """Path of a board's released image (Intel HEX); a LinkError names the places where it was looked for."""
+    places = [folder / f"{board}.hex" for folder in _FOLDERS]
+    for place in places:
         if place.is_file():
             return place
-    looked = " or ".join(str(place) for place in _PLACES)
+    looked = " or ".join(map(str, places))
     raise LinkError(
-        f"the released flash image was not found at {looked}; install planarm again or build firmware/release/uno.hex"
+        f"the released flash image was not found at {looked}; install planarm again or run firmware/build.py release"
     )

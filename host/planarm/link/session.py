@@ -20,6 +20,7 @@ from planarm_wire.framing import Frame, FrameDecoder, encode_frame
 from planarm_wire.messages import (
     DELIMITER,
     FAULT_WORDS,
+    JOINTS,
     PROTOCOL_VERSION,
     QUEUE_FRAME_BYTES,
     RESULT_WORDS,
@@ -235,10 +236,15 @@ class Session:
             if isinstance(status, Status) and status.refusal == Result.VERSION and status.refusal_seq == _HELLO_SEQ:
                 raise LinkError(_version_words("refused the host's protocol version"))
 
+    @property
+    def joints(self) -> int:
+        """The device's joints; those of the usual board until it has told."""
+        return JOINTS if self.welcome is None else self.welcome.joints
+
     # -- an open session ----------------------------------------------------------------------------------------------
 
     def _on_reply(self, frame: Frame, now_s: float) -> None:
-        message = _decode(frame)
+        message = _decode(frame, self.joints)
         if isinstance(message, Welcome):
             self._check_same_boot(message)
         elif isinstance(message, Status):
@@ -332,9 +338,9 @@ def fault_words(fault: Fault) -> str:
     return f"the device stopped: {words.text}; {words.fix}"
 
 
-def _decode(frame: Frame) -> Message:
+def _decode(frame: Frame, joints: int = JOINTS) -> Message:
     try:
-        return decode(frame.type_code, frame.payload)
+        return decode(frame.type_code, frame.payload, joints)
     except WireError as error:
         raise LinkError(f"a reply of the device cannot be read ({error}); {_FLASH_IT}") from error
 

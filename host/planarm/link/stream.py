@@ -210,7 +210,7 @@ class Stream:
         if not self._session.idle:
             return
         if self._status.state is State.IDLE and self._options.start_stop_ticks:
-            self._session.send(config_of(self._options.start_stop_ticks), now_s)
+            self._session.send(config_of(self._options.start_stop_ticks, self._session.joints), now_s)
         self.phase = Phase.CONFIGURING
 
     def _enable(self, now_s: float) -> None:

@@ -6,7 +6,7 @@ from enum import Enum, auto
 
 from planarm.link.arq import Resent
 from planarm.link.clock_sync import Span
-from planarm_wire.messages import DEFAULT_WAKE_TICKS, Config, Ledger, PinMap, State
+from planarm_wire.messages import DEFAULT_START_STOP_TICKS, DEFAULT_WAKE_TICKS, JOINTS, Config, Ledger, PinMap, State
 from planarm_wire.rates import Allowance
 
 AT_EASE = (State.HOLDING, State.HELD, State.STARVED, State.STOPPING)
@@ -94,7 +94,7 @@ class Phase(Enum):
     DONE = auto()
 
 
-def config_of(start_stop_ticks: Sequence[int]) -> Config:
-    """Return the wiring that is the firmware's default, with these start-stop intervals."""
-    told = tuple(start_stop_ticks)
-    return Config(PinMap.OWN, len(told), 0, 0, 0, DEFAULT_WAKE_TICKS, 0, told)
+def config_of(start_stop_ticks: Sequence[int], joints: int = JOINTS) -> Config:
+    """Return the own wiring of a device with so many joints and these start-stop intervals; further joints rest."""
+    told = (*start_stop_ticks, *(DEFAULT_START_STOP_TICKS,) * (joints - len(start_stop_ticks)))
+    return Config(PinMap.OWN, joints, 0, 0, 0, DEFAULT_WAKE_TICKS, 0, told)

@@ -11,6 +11,7 @@ from planarm.stepping.plan import SegmentPlan
 from planarm.stepping.train import StepTrain, Ticks, require_steppable
 from planarm.stepping.windows import EXACT_TO_1_US, Coding, tolerance_ticks, windows_of
 from planarm_wire.messages import Move, Segment
+from planarm_wire.wirings import board_of
 
 __all__ = ["Coding", "SegmentPlan", "compress", "expand"]
 
@@ -36,6 +37,7 @@ def compress(train: StepTrain, coding: Coding = EXACT_TO_1_US) -> SegmentPlan:
 def _segments(train: StepTrain, ends: Ticks, runs: Ticks) -> tuple[Segment, ...]:
     """Return the wire's form of the runs; a run's direction is that of its first step in the train."""
     following = [0] * len(train.steps)
+    resting = (Move(0),) * (board_of(len(train.steps)).joints - len(train.steps))
     segments = []
     for k, (begin, end) in enumerate(pairwise([0, *ends.tolist()])):
         moves = []
@@ -45,7 +47,7 @@ def _segments(train: StepTrain, ends: Ticks, runs: Ticks) -> tuple[Segment, ...]
             moves.append(Move(2 * count + int(positive), run[FIRST], run[INTERVAL] >> 8, run[ADD]))
             following[j] += count
         is_last = k == len(ends) - 1
-        segments.append(Segment(2 * (end - begin) + int(is_last), tuple(moves)))
+        segments.append(Segment(2 * (end - begin) + int(is_last), (*moves, *resting)))
     return tuple(segments)
 
 

@@ -6,6 +6,7 @@ import numpy as np
 
 from planarm.stepping.plan import SegmentPlan
 from planarm.stepping.train import Ticks
+from planarm_wire.wirings import board_of
 
 
 class SegmentTable(NamedTuple):
@@ -58,7 +59,9 @@ def segment_bytes(table: SegmentTable) -> Ticks:
     moves = _varuint_bytes(2 * table.counts + table.positive) + some * _varuint_bytes(table.first)
     zigzag = np.where(table.add_q16 >= 0, 2 * table.add_q16, -2 * table.add_q16 - 1)
     moves = moves + several * (_varuint_bytes(table.interval_q16 >> 8) + _varuint_bytes(zigzag))
-    total: Ticks = size + moves.sum(axis=1)
+    joints = table.counts.shape[1]
+    resting = board_of(joints).joints - joints  # a byte each
+    total: Ticks = size + moves.sum(axis=1) + resting
     return total
 
 

@@ -1,0 +1,22 @@
+"""Which board, and so which flash image, an arm needs: by its joints and by where its drivers are wired."""
+
+from __future__ import annotations
+
+from planarm_wire.boards import Board
+from planarm_wire.errors import WireError
+from planarm_wire.messages import BOARDS
+
+OWN = "own"
+
+
+def board_of(joints: int, pin_map: str = OWN) -> Board:
+    """Return the board with the fewest joints that has enough of them.
+
+    Raises WireError when no board of this wiring steps so many.
+    """
+    wired = [board for board in BOARDS.values() if board.pin_map == pin_map]
+    fitting = [board for board in wired if board.joints >= joints]
+    if not fitting:
+        most = max(board.joints for board in wired)
+        raise WireError(f"an arm with {joints} joints; the wiring {pin_map} has pins for {most}")
+    return min(fitting, key=lambda board: board.joints)
