@@ -103,7 +103,7 @@ def test_hello_is_repeated_with_pauses_that_let_a_bootloader_give_up():
         if session.take_output():
             said.append(now_s - 10.0)
     assert said == pytest.approx([0.0, 0.25, 0.75, 2.0, 3.25, 4.5])
-    with pytest.raises(LinkError, match=r"no answer to HELLO within 5 s \(6 tries\).*pio run -d firmware"):
+    with pytest.raises(LinkError, match=r"no answer to HELLO within 5 s \(6 tries\).*planarm flash"):
         session.on_time(15.0)
 
 
@@ -128,14 +128,14 @@ def test_another_protocol_version_says_what_to_flash():
 def test_a_device_that_refuses_our_version_says_the_same():
     session = Session(NONCE, 0.0)
     session.on_time(0.0)
-    with pytest.raises(LinkError, match=r"refused the host's protocol version.*pio run -d firmware"):
+    with pytest.raises(LinkError, match=r"refused the host's protocol version.*planarm flash"):
         session.receive(reply(status(refusal=Result.VERSION, refusal_seq=0)), 0.01)
 
 
 def test_another_specification_says_what_to_flash():
     session = Session(NONCE, 0.0)
     with pytest.raises(
-        LinkError, match=r"firmware 1\.2\.3 made from another protocol description.*pio run -d firmware"
+        LinkError, match=r"firmware 1\.2\.3 made from another protocol description.*planarm flash"
     ):
         session.receive(reply(welcome(spec_hash=SPEC_HASH ^ 1)), 0.01)
 
@@ -219,7 +219,7 @@ def test_a_device_that_answers_but_takes_nothing_is_told_from_a_silent_one():
 
 def test_a_reply_that_passes_its_checks_but_has_another_form_is_an_error():
     session = opened()
-    with pytest.raises(LinkError, match=r"cannot be read .*pio run -d firmware"):
+    with pytest.raises(LinkError, match=r"cannot be read .*planarm flash"):
         session.receive(encode_frame(1, MessageType.STATUS, b"short"), 0.02)
 
 

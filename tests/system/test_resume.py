@@ -202,3 +202,14 @@ def test_a_remainder_makes_the_steps_that_are_left_within_the_motors_limits(plan
     assert certificate.ok, certificate.explain()
     assert len(rest.allowances) == len(rest.segments)
     assert rest.duration_ticks < 1.6 * (train.duration_ticks - at) + 1.6e6
+
+
+def test_wherever_the_arm_stops_the_rest_keeps_the_intervals_at_its_border():
+    """Steps coded anew may be late, those that follow early: together they must not be nearer than a motor allows."""
+    plan = plan_scene(load_scene(SCENE.parents[1] / "table1_case1.toml"), lambda _stage, _share: None)
+    train = expand(plan.segments)
+    for at in np.linspace(0.0, 0.995, 100) * train.duration_ticks:
+        made = [int(np.searchsorted(joint.ticks, at)) for joint in train.steps]
+        rest = remainder(plan.segments, made, plan.scene.joints)
+        certificate = certify_remainder(plan.scene, steps_left(plan.segments, made), rest)
+        assert certificate.ok, certificate.explain()

@@ -81,8 +81,9 @@ def remainder(plan: SegmentPlan, made: Sequence[int], axes: Sequence[JointSpec])
     begin = _begin_ticks(whole, made)
     starts = np.concatenate([[0], np.cumsum([segment.duration_flags >> 1 for segment in plan.segments])])
     ramp = _ramp(plan.allowances, starts, begin, _first_rate(whole, made, coding))
-    slowed = _slowed(whole, made, ramp, int(starts[ramp.border]))
-    first = compress(slowed, coding)
+    end = int(starts[ramp.border])
+    slowed = _slowed(whole, made, ramp, end)
+    first = compress(slowed, coding, _latest(whole, slowed.duration_ticks, end))
     following = plan.segments[ramp.border :]
     segments = first.segments
     if following:
@@ -176,6 +177,19 @@ def _slowed(whole: StepTrain, made: Sequence[int], ramp: Ramp, end: int) -> Step
         steps.append(JointSteps(ticks, joint.directions[count:until]))
     duration = LEAD_TICKS + int(np.ceil(ramp.t_ticks[-1])) + 1
     return StepTrain(_standing(whole, made), tuple(steps), duration)
+
+
+def _latest(whole: StepTrain, duration_ticks: int, end: int) -> tuple[int, ...]:
+    """Return how late each joint's last step before the ramp's end may be: no nearer to what follows than planned.
+
+    What follows is coded already, and its first step may be as early as its tolerance allows.
+    """
+    latest = []
+    for joint in whole.steps:
+        until = int(np.searchsorted(joint.ticks, end))
+        last = int(joint.ticks[until - 1]) if until else end
+        latest.append(duration_ticks - (end - last))
+    return tuple(latest)
 
 
 def _allowances(first: SegmentPlan, planned: Sequence[Allowance], starts: Ticks, ramp: Ramp) -> list[Allowance]:

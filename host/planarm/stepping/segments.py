@@ -1,5 +1,6 @@
 """Compress a step train into the wire's segments, and check the result by expanding it again."""
 
+from collections.abc import Sequence
 from itertools import pairwise
 
 import numpy as np
@@ -16,10 +17,11 @@ from planarm_wire.wirings import board_of
 __all__ = ["Coding", "SegmentPlan", "compress", "expand"]
 
 
-def compress(train: StepTrain, coding: Coding = EXACT_TO_1_US) -> SegmentPlan:
+def compress(train: StepTrain, coding: Coding = EXACT_TO_1_US, latest_ticks: Sequence[int] = ()) -> SegmentPlan:
     """Return segments that make the train's steps: counts and directions exactly, times within their tolerance.
 
     The tolerance is `planarm.stepping.windows.tolerance_ticks`; no interval gets shorter than the train's shortest.
+    `latest_ticks`, where given, tells of each joint how late its last step may be: what follows may be near.
 
     Raises:
         TimingError: steps are too close to each other for the firmware.
@@ -27,7 +29,7 @@ def compress(train: StepTrain, coding: Coding = EXACT_TO_1_US) -> SegmentPlan:
     require_steppable(train)
     if train.duration_ticks == 0:
         return SegmentPlan((), 0, train.start_usteps)
-    windows = windows_of(train, coding)
+    windows = windows_of(train, coding, latest_ticks)
     ends, runs = cut(windows, coding.fast_ticks, train.duration_ticks)
     plan = SegmentPlan(_segments(train, ends, runs), train.duration_ticks, train.start_usteps)
     _require_same_steps(train, expand(plan), coding)

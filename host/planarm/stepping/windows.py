@@ -100,8 +100,8 @@ def least_interval_ticks(steps: JointSteps) -> int:
     return int(along.min()) if len(along) else MIN_INTERVAL_TICKS
 
 
-def windows_of(train: StepTrain, coding: Coding = EXACT_TO_1_US) -> Windows:
-    """Return the windows of all steps."""
+def windows_of(train: StepTrain, coding: Coding = EXACT_TO_1_US, latest_ticks: Sequence[int] = ()) -> Windows:
+    """Return the windows of all steps; `latest_ticks` tells how late each joint's last step may be, where given."""
     first = np.cumsum([0, *(len(joint.ticks) for joint in train.steps)], dtype=np.int64)
     least = np.array([least_interval_ticks(joint) for joint in train.steps], np.int64)
     steps = np.empty((first[-1], 7), np.int64)
@@ -111,6 +111,8 @@ def windows_of(train: StepTrain, coding: Coding = EXACT_TO_1_US) -> Windows:
         part[:, TICK] = joint.ticks
         part[:, LOW] = joint.ticks - tolerance
         part[:, HIGH] = np.minimum(joint.ticks + tolerance, train.duration_ticks - 1)
+        if len(part) and j < len(latest_ticks):
+            part[-1, HIGH] = min(part[-1, HIGH], latest_ticks[j])
         _tighten(joint.ticks, joint.directions, least[j], part)
         part[:, RUN_END] += first[j]
         start_stop = coding.start_stop_ticks[j] if j < len(coding.start_stop_ticks) else 0
