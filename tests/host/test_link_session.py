@@ -134,9 +134,7 @@ def test_a_device_that_refuses_our_version_says_the_same():
 
 def test_another_specification_says_what_to_flash():
     session = Session(NONCE, 0.0)
-    with pytest.raises(
-        LinkError, match=r"firmware 1\.2\.3 made from another protocol description.*planarm flash"
-    ):
+    with pytest.raises(LinkError, match=r"firmware 1\.2\.3 made from another protocol description.*planarm flash"):
         session.receive(reply(welcome(spec_hash=SPEC_HASH ^ 1)), 0.01)
 
 

@@ -19,6 +19,7 @@ from planarm.stepping.remainder import certify_remainder, remainder, steps_left
 from planarm_sim.cpu.chip import ResetCause
 from planarm_wire.messages import EMERGENCY_CODE, State
 
+CASE_1 = SCENE.parents[2] / "examples" / "table1_case1.toml"
 MOMENTS_S = (0.12, 0.2, 0.31, 0.45)  # the motion begins about 0.09 s after power-up and lasts 0.43 s
 
 
@@ -206,7 +207,7 @@ def test_a_remainder_makes_the_steps_that_are_left_within_the_motors_limits(plan
 
 def test_wherever_the_arm_stops_the_rest_keeps_the_intervals_at_its_border():
     """Steps coded anew may be late, those that follow early: together they must not be nearer than a motor allows."""
-    plan = plan_scene(load_scene(SCENE.parents[1] / "table1_case1.toml"), lambda _stage, _share: None)
+    plan = plan_scene(load_scene(CASE_1), lambda _stage, _share: None)
     train = expand(plan.segments)
     for at in np.linspace(0.0, 0.995, 100) * train.duration_ticks:
         made = [int(np.searchsorted(joint.ticks, at)) for joint in train.steps]
