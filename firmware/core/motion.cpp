@@ -18,7 +18,7 @@ Joint joints[wire::JOINTS];
 namespace {
 
 // A slice is prepared this long before its start: 3.5 ms, in which the main program hands over the runs of
-// both joints at 65,000 steps/s after the longest of its other jobs. No earlier, so that a hold takes effect
+// all joints at the board's rate after the longest of its other jobs. No earlier, so that a hold takes effect
 // soon.
 constexpr int32_t PREPARE_AHEAD_TICKS = wire::MIN_LEAD_TICKS;
 

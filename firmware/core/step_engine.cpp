@@ -121,8 +121,9 @@ void cut_active(uint8_t were_on, uint32_t first_ticks) {
 template <uint8_t JOINT>
 bool may_freeze(uint16_t counter) {
     if (!hal::step_interrupt_is_on<JOINT>()) return true;
-    return !hal::step_is_high<JOINT>() &&
-           static_cast<uint16_t>(hal::step_edge<JOINT>() - counter) > FREEZE_MARGIN_TICKS;
+    // An edge that is past, and whose interrupt is only on its way, is no more than some hundred ticks away.
+    const int16_t ahead = static_cast<int16_t>(hal::step_edge<JOINT>() - counter);
+    return !hal::step_is_high<JOINT>() && ahead > static_cast<int16_t>(FREEZE_MARGIN_TICKS);
 }
 
 // What the interrupts change, as it was when the counter was read.

@@ -15,7 +15,7 @@ SLICE_WORK_TICKS: Final = 8_000
 STRETCHED_TICKS: Final = 17_000
 """What it needs more for a segment that is stretched: with those of 0.5 and 1 ms it keeps up at one every 2.0 ms, and
 not at one every 1.7 ms."""
-LATEST_READ_TICKS: Final = 20_000
+LATEST_READ_TICKS: Final = 40_000
 """How long before its start a segment must be there."""
 LEAST_SHARE: Final = 0.05
 """Keeps an overloaded board's time finite."""

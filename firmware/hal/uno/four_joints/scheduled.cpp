@@ -4,7 +4,7 @@
 // nearly so, is raised at once, both joints in the same few cycles; only then each step is counted, its pulse
 // taken low and its next edge computed, as step_engine::on_match of core/step_engine.h does it, statement by
 // statement. So neither waits for the other's computation: a step rises at most SCHEDULED_EARLY_TICKS early,
-// or as late as another interrupt holds this one up.
+// or as late as Timer2's grain and another interrupt hold this one up.
 //
 // Like the interrupts of joints 0 and 1 (step_interrupts.cpp) it needs no stack and uses the registers that
 // no compiled code uses, but for the fractions in r12 to r15. Cycles with entry and jump, counted by
@@ -24,8 +24,10 @@ ScheduledJoint scheduled[SCHEDULED_JOINTS];
 volatile uint8_t scheduled_on;
 
 void wake_scheduled() {
-    OCR2A = static_cast<uint8_t>(TCNT2 + 2);
-    TIFR2 = _BV(OCF2A);
+    // A wake-up of the other joint that is nearer stays, and one that is due is not forgotten: each look sets
+    // the next.
+    const bool is_nearer = (TIMSK2 & _BV(OCIE2A)) != 0 && static_cast<uint8_t>(OCR2A - TCNT2) <= 2;
+    if (!is_nearer) OCR2A = static_cast<uint8_t>(TCNT2 + 2);
     TIMSK2 = _BV(OCIE2A);
 }
 
