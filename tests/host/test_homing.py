@@ -14,6 +14,7 @@ from planarm.operations.arm_moves import goto
 from planarm.operations.homing import Touched, home, prove_steps
 from planarm.scene import LimitSwitchSpec, load_scene
 from planarm.streaming.standing import look, pose_of, usteps_at
+from planarm_wire.messages import HOLD_CODE
 
 PORT = "/dev/ttyUNO"
 MICROSTEPS = 16
@@ -88,6 +89,23 @@ def test_a_jammed_rotors_loss_is_told_and_the_count_mended(scene, positions, tmp
     told_rad = pose_of(scene, look(line, PORT, scene, positions).usteps)[0]
     np.testing.assert_allclose(told_rad, really_rad(line), atol=np.radians(0.05))
     assert prove_steps(line, PORT, scene, positions).lost_usteps == (0, 0), "the count is mended"
+
+
+def test_a_disturbed_byte_that_holds_does_not_pass_for_a_switch(scene, positions, monkeypatch):
+    """HOLD ends homing wherever the joint is: the device is at ease, without a fault, and not at its switch."""
+    line = arm_of(scene)
+    begin_s, write, held = line.clock.now_s(), line.write, []
+
+    def write_disturbed(data):
+        write(data)
+        if line.clock.now_s() > begin_s + 0.5 and not held:
+            held.append(line.clock.now_s())
+            write(bytes([HOLD_CODE]))
+
+    monkeypatch.setattr(line, "write", write_disturbed)
+    with pytest.raises(LinkError, match=r"joint 1: homing was broken off before its switch"):
+        home(line, PORT, scene, positions)
+    assert look(line, PORT, scene, positions).how is None
 
 
 def test_losses_are_whole_turns_of_the_field_and_the_rest_is_the_switch():

@@ -88,8 +88,8 @@ class Homed:
 
     @property
     def lost_usteps(self) -> tuple[int, ...] | None:
-        """Steps lost since the position was told, each joint's; None: it was not known."""
-        return None if self.known_by is None else tuple(touch.lost_usteps for touch in self.touched)
+        """Steps lost since the arm was homed, each joint's; None: it was not, and hand and eye tell no single steps."""
+        return tuple(touch.lost_usteps for touch in self.touched) if self.known_by == HOMED else None
 
 
 def home(transport: Transport, port: str, scene: Scene, positions: Positions) -> Homed:
@@ -100,7 +100,8 @@ def home(transport: Transport, port: str, scene: Scene, positions: Positions) ->
         DeviceFault: a switch was not found; the drivers hold.
         LinkError: the line failed.
     """
-    session, known_by = _ready(transport, port, scene, positions)
+    session, known_by = _meet(transport, port, scene, positions)
+    _make_ready(transport, session, scene)
     homed = Homed(_touch_all(transport, session, scene), known_by)
     return _settle(transport, port, scene, positions, session, homed, homed.usteps)
 
@@ -112,19 +113,19 @@ def prove_steps(transport: Transport, port: str, scene: Scene, positions: Positi
         SceneError, DeviceFault: as `home`.
         LinkError: the line failed, or the board has restarted since the arm was homed, so that nothing can be told.
     """
-    session, known_by = _ready(transport, port, scene, positions)
+    session, known_by = _meet(transport, port, scene, positions)
     if known_by != HOMED:
         raise LinkError(
             f"nothing to compare with: the arm was not homed since the board's last start, its place is"
             f" {known_by or 'not known'}; 'planarm home SCENE' before the run, then ask again after it"
         )
+    _make_ready(transport, session, scene)
     homed = Homed(_touch_all(transport, session, scene), known_by)
     return _settle(transport, port, scene, positions, session, homed, homed.kept_usteps)
 
 
-def _ready(transport: Transport, port: str, scene: Scene, positions: Positions) -> tuple[Session, str | None]:
-    """Make the device ready for homing; return by what its count is known, too."""
-    axes = motor_axes(scene.joints, scene.coupling)
+def _meet(transport: Transport, port: str, scene: Scene, positions: Positions) -> tuple[Session, str | None]:
+    """Say hello, and nothing that lets go of the arm; return by what the device's count is known, too."""
     switched = {switch.joint for switch in scene.limit_switches}
     missing = [number for number in range(1, len(scene.joints) + 1) if number not in switched]
     if missing or not np.array_equal(np.array(scene.coupling), np.eye(len(scene.joints))):
@@ -137,21 +138,25 @@ def _ready(transport: Transport, port: str, scene: Scene, positions: Positions) 
         )
     session = open_session(transport)
     assert session.welcome is not None, "an open session has a welcome"
-    known_by = positions.how(port, session.welcome.boot_nonce, arm_hash(asdict(scene)))
+    return session, positions.how(port, session.welcome.boot_nonce, arm_hash(asdict(scene)))
+
+
+def _make_ready(transport: Transport, session: Session, scene: Scene) -> None:
+    """Tell the device of its motors and switches, and switch its drivers on."""
     if request(transport, session, Query()).state is not State.IDLE:
         request(transport, session, Clear())
-    told = config_of([start_stop_ticks(axis) for axis in axes])
+    told = config_of([start_stop_ticks(axis) for axis in motor_axes(scene.joints, scene.coupling)])
     request(transport, session, replace(told, options=WATCH_SWITCHES))
     request(transport, session, Enable(1))
-    return session, known_by
 
 
 def _touch_all(transport: Transport, session: Session, scene: Scene) -> tuple[Touched, ...]:
     touched = {}
     for switch in scene.limit_switches:
         number, axis = switch.joint - 1, scene.joints[switch.joint - 1]
+        holds = request(transport, session, Query()).holds
         request(transport, session, _home_order(scene, switch))
-        _wait_for_switch(transport, session, switch)
+        _wait_for_switch(transport, session, switch, holds)
         assert session.status is not None, "a session that was answered has a status"
         counted = session.status.ledger.position_usteps[number]
         touched[number] = Touched(switch.joint, counted, _place_usteps(scene, switch), _field_usteps(axis))
@@ -201,7 +206,8 @@ def _home_order(scene: Scene, switch: LimitSwitchSpec) -> Home:
     )
 
 
-def _wait_for_switch(transport: Transport, session: Session, switch: LimitSwitchSpec) -> None:
+def _wait_for_switch(transport: Transport, session: Session, switch: LimitSwitchSpec, holds: int) -> None:
+    """Wait until the joint rests at its switch; a hold, which may be a disturbed byte, ends homing elsewhere."""
     clock = transport.clock
     limit_s = clock.now_s() + HOMING_LIMIT_S
     while (status := request(transport, session, Query())).state is State.HOMING:
@@ -211,3 +217,5 @@ def _wait_for_switch(transport: Transport, session: Session, switch: LimitSwitch
         clock.wait_until(clock.now_s() + HOMING_POLL_S)
     if status.fault is not Fault.NONE:
         raise DeviceFault(f"joint {switch.joint}: {fault_words(status.fault)}")
+    if status.holds != holds:
+        raise LinkError(f"joint {switch.joint}: homing was broken off before its switch; start it again")

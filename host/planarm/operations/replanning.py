@@ -20,14 +20,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from planarm.errors import NoPathError, SceneError, TimingError
+from planarm.link.clock_sync import MOST_SLOWNESS
 from planarm.link.exchange import stream_plan
 from planarm.link.position import StreamError, moved_usteps
-from planarm.link.stream import Stream, StreamOptions
+from planarm.link.stream import Stream
 from planarm.link.transport import Transport
 from planarm.model.arm import Arm
 from planarm.model.kinematics import forward
 from planarm.model.shapes import Circle, Polygon, obstacle_set, shape_of
-from planarm.model.transmission import Transmission, motor_axes
+from planarm.model.transmission import Transmission
 from planarm.pipeline import Notice, plan_scene, planning_margin_cm
 from planarm.plan import Plan
 from planarm.roadmap.planning import RoadmapTask, way_from
@@ -35,7 +36,7 @@ from planarm.roadmap.recheck import first_contact
 from planarm.routes.route import route_through
 from planarm.scene import Obstacle, Scene
 from planarm.stepping.stopping import stops
-from planarm.stepping.windows import start_stop_ticks
+from planarm.streaming.plan_stream import options_for
 from planarm.trajectory.motion import Trajectory
 from planarm.workspace.joint_proof import joint_world
 from planarm_wire.messages import SLICE_TICKS, TICKS_HZ
@@ -289,18 +290,18 @@ def rest_time_s(plan: Plan, from_s: float, share: float) -> float:
 
 
 def whereabouts_s(plan: Plan, stream: Stream, now_s: float) -> tuple[float, float]:
-    """Return the least and the largest path time at which the arm can be, by ledger and clock."""
+    """Return the least and the largest path time of the arm: by the ledger, and by the fastest board's clock."""
     segments = plan.segments.segments[: stream.executed_segments]
     least_s = sum(map(duration_ticks, segments)) / TICKS_HZ
-    return least_s, max(least_s, now_s - stream.started_s)
+    began_s = stream.began_s.least if stream.began_s else stream.started_s
+    return least_s, max(least_s, (now_s - began_s) * (1.0 + MOST_SLOWNESS))
 
 
 def _stream_leg(run: _Run, plan: Plan) -> tuple[Floats, Verdict | None]:
     """Stream one plan until it is done or stopped; return where the arm rests, and the verdict that stopped it."""
     run.begin_leg()
     scene = plan.scene
-    intervals = tuple(start_stop_ticks(axis) for axis in motor_axes(scene.joints, scene.coupling))
-    options = StreamOptions(allowances=plan.segments.allowances, start_stop_ticks=intervals)
+    options = options_for(scene, plan.segments)
     start = np.array(plan.segments.start_usteps)
     try:
         result = stream_plan(

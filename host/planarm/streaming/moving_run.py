@@ -103,12 +103,12 @@ class Timekeeper:
         percent = BRAKING_PERCENT if self._early_now_s > EARLY_S else FULL_PERCENT
         if percent != self._percent and (percent != FULL_PERCENT or self._early_now_s <= 0.0):
             self._percent = percent
-            stream.override(percent)
+            stream.override(min(percent, stream.path_clock_percent))  # a slow line keeps what it was given
 
     def _unheard_s(self, told: StreamProgress) -> float:
         """How late the arm is if it has stood still since it was last heard of; 0 while that was just now."""
         now_s = self._clock.now_s()
-        return now_s - self.start_at_s - told.path_span_s.least if now_s - told.at_s > SILENT_S else 0.0
+        return now_s - self.start_at_s - told.path_span_s.least if now_s - told.made_s.most > SILENT_S else 0.0
 
 
 @dataclass(frozen=True, slots=True)
