@@ -221,7 +221,15 @@ def optimised(scene: Scene, margin_cm: float, known: Trajectory, limits: Limits,
     if spline is None:
         return known
     motions = known, fastest_motion(spline, limits)
-    return min(motions, key=lambda motion: schedule(scene, partial(timed, scene, motion, limits))[0].duration_s)
+    return min(motions, key=lambda motion: _executed_s(scene, motion, limits))
+
+
+def _executed_s(scene: Scene, motion: Trajectory, limits: Limits) -> float:
+    """Return how long a motion lasts as it will be executed; for ever, where no timing of it can be."""
+    try:
+        return schedule(scene, partial(timed, scene, motion, limits))[0].duration_s
+    except TimingError:
+        return np.inf
 
 
 def tip_curve_cm(trajectory: Trajectory, arm: Arm) -> NDArray[np.float64]:

@@ -127,9 +127,11 @@ def test_a_line_that_takes_nothing_is_told(ends, monkeypatch):
 
 
 def test_the_wheel_comes_before_the_checkout(tmp_path, monkeypatch):
-    wheel, checkout = tmp_path / "wheel.hex", tmp_path / "checkout.hex"
-    monkeypatch.setattr(images, "_PLACES", (wheel, checkout))
-    with pytest.raises(LinkError, match=r"not found at .*wheel\.hex or .*checkout\.hex"):
+    wheel, checkout = tmp_path / "wheel" / "uno.hex", tmp_path / "checkout" / "uno.hex"
+    wheel.parent.mkdir()
+    checkout.parent.mkdir()
+    monkeypatch.setattr(images, "_FOLDERS", (wheel.parent, checkout.parent))
+    with pytest.raises(LinkError, match=r"not found at .*wheel.uno\.hex or .*checkout.uno\.hex"):
         images.released_image()
     checkout.write_text("")
     assert images.released_image() == checkout

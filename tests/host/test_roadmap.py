@@ -198,7 +198,6 @@ def test_costs_are_the_edges_own_and_bounds_hold_for_each(cost):
     for e in range(0, len(graph.cost), 7):
         a, b = roadmap.poses_rad[graph.tail[e]], roadmap.poses_rad[graph.head[e]]
         assert graph.cost[e] == pytest.approx(edge_costs(roadmap.model, KINDS[cost], a, b)[0], rel=1e-9)
-        assert graph.cost[e] == pytest.approx(edge_costs(roadmap.model, KINDS[cost], a, b)[0], rel=1e-9)
         assert bound(bounds, graph.tail[e], graph.head[e]) <= graph.cost[e]
         for k in range(len(bounds.potentials)):
             rise = bounds.potentials[k, graph.head[e]] - bounds.potentials[k, graph.tail[e]]

@@ -148,11 +148,6 @@ class Plant:
         self._at_rest = False
         self._state.outside[joint] = torque_nm
 
-    def set_supply(self, motor: int, volts: float) -> None:
-        """Change what a driver can put on its motor's phases, from now on."""
-        self._at_rest = False
-        self._state.supply[motor] = volts
-
     def take(self, events: Ints) -> None:
         """Take what the drivers ask for: cycle, motor, phase, on; it counts when its time comes."""
         if len(events):

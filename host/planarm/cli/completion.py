@@ -6,8 +6,6 @@ import argparse
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
-SHELLS = ("bash", "zsh", "fish")
-
 
 @dataclass(frozen=True, slots=True)
 class Option:

@@ -45,10 +45,11 @@ def check_stop(plan: SegmentPlan, table: SegmentTable, planned: Planned, scene: 
     starts = table.starts
     setting = "joints.max_acceleration_deg_s2"
     by_torque, borders_s = _torque_changes(planned, scene), starts / TICKS_HZ
+    inner_s = planned.t_s[1:-1]
     for name, column, sign in (("slowing", 0, 1.0), ("speeding up", 1, -1.0)):
         largest = np.minimum(
-            _least_in(_largest_changes(planned, scene, sign), planned.t_s[1:-1], borders_s),
-            _least_in(by_torque[column], planned.t_s[1:-1:STRIDE], borders_s),
+            _least_in(_largest_changes(planned, scene, sign), inner_s, borders_s),
+            _least_in(np.interp(inner_s, inner_s[::STRIDE], by_torque[column]), inner_s, borders_s),
         )
         beyond = told[:, column] / np.maximum(largest, 1e-9)
         k = int(np.argmax(beyond))
