@@ -1,17 +1,19 @@
 """Homing and the proof of lost steps, on the emulated arm: what is printed is what the plant knows."""
 
 from dataclasses import replace
+from io import BytesIO
 
 import numpy as np
 import pytest
 
 from broken_runs import SCENE, board
+from planarm.cli.main import main
 from planarm.errors import LinkError, SceneError
 from planarm.link.arm_record import ArmSetup
 from planarm.link.positions import Positions
 from planarm.link.transport import open_transport
 from planarm.operations.arm_moves import goto
-from planarm.operations.homing import Touched, home, prove_steps
+from planarm.operations.homing import Homed, Touched, home, prove_steps
 from planarm.scene import LimitSwitchSpec, load_scene
 from planarm.streaming.standing import look, pose_of, usteps_at
 from planarm_wire.messages import HOLD_CODE
@@ -122,3 +124,17 @@ def test_there_is_nothing_to_prove_before_homing(scene, positions):
 def test_homing_needs_a_switch_on_every_joint(scene, positions):
     with pytest.raises(SceneError, match=r"limit_switches: joints \[2\] have none"):
         home(board(), PORT, replace(scene, limit_switches=SWITCHES[:1]), positions)
+
+
+@pytest.mark.parametrize(("counted", "code", "said"), [(2775, 7, "+64 micro-steps lost"), (2713, 0, "no step lost")])
+def test_the_proof_is_printed_and_a_loss_is_an_exit_code(monkeypatch, capsys, counted, code, said):
+    """The words are those of docs/board.md."""
+    homed = Homed((Touched(1, counted, 2711, 64), Touched(2, -900, -900, 64)), "homed")
+    monkeypatch.setattr("planarm.link.transport.open_transport", lambda *_line: BytesIO())
+    monkeypatch.setattr("planarm.operations.homing.prove_steps", lambda *_arm: homed)
+    with pytest.raises(SystemExit) as left:
+        main(["home", str(SCENE), "--prove", "--port", PORT])
+    out = capsys.readouterr().out
+    assert left.value.code == code
+    assert f"joint 1: {said} (counted {counted} at the switch, which is at 2711; it repeats within " in out
+    assert "lost_usteps" not in out, "the sentence has it"

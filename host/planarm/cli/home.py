@@ -22,7 +22,8 @@ def execute(options: argparse.Namespace) -> int:
     if options.prove and not options.json:
         _tell(homed)
     stands = homed.kept_usteps if options.prove else homed.usteps
-    tell_standing(options.json, arm.scene, stands, "homed", **_figures(homed))
+    told = {} if options.prove and not options.json else _figures(homed)  # else told already, in sentences
+    tell_standing(options.json, arm.scene, stands, "homed", **told)
     return StepsDifferError.exit_code if options.prove and any(homed.lost_usteps or ()) else 0
 
 
