@@ -72,15 +72,16 @@ class FakeLine:
             self.received.append((self.clock.time_s - self.start_s, data[:taken]))
         return taken
 
-    def wait(self, timeout_s: float, *, for_bytes: bool) -> None:
+    def wait(self, timeout_s: float, *, for_bytes: bool) -> bool:
         self._catch_up()
         if for_bytes and self.inbox:
-            return
+            return True
         wake = self.clock.time_s + max(timeout_s, 0.0)
         if for_bytes and self.open and self.acts:
             wake = min(wake, max(self.start_s + self.acts[0][0], self.clock.time_s))
         self.waits.append(wake - self.clock.time_s)
         self.clock.time_s = wake
+        return bool(self.acts) and self.start_s + self.acts[0][0] <= wake
 
     @property
     def text(self) -> bytes:

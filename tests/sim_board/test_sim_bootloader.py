@@ -149,7 +149,7 @@ def board_behind_a_terminal(uno):
         def wait(self, timeout_s, *, for_bytes):
             if uno.pin("D9").level:
                 runs.set()
-            super().wait(timeout_s, for_bytes=for_bytes)
+            return super().wait(timeout_s, for_bytes=for_bytes)
 
     with WatchedLine(baud=9_600) as line:
         run = lambda: results.append(run_board(uno, line, WallClock(), stop, follow_baud=True, say=[].append))  # noqa: E731

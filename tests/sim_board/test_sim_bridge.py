@@ -8,7 +8,7 @@ from planarm_sim import Uno
 from planarm_sim.board import CLOCK_HZ
 from planarm_sim.board.usb_bridge import FLUSH_CYCLES, PACKET_CYCLES, RING_BYTES
 from planarm_sim.bridge import Bridge
-from planarm_sim.bridge.bridge import GIVE_UP_LAG_S, LEAST_SLICE_S, LIVELY_SLICE_S, MAX_CHUNK_S, QUIET_SLICE_S
+from planarm_sim.bridge.bridge import AHEAD_S, GIVE_UP_LAG_S, LEAST_SLICE_S, LIVELY_SLICE_S, MAX_CHUNK_S, QUIET_SLICE_S
 from sim_board.fake_line import FakeClock, FakeLine
 
 DATA = Path(__file__).parent / "data"
@@ -243,6 +243,28 @@ def test_behind_the_usb_bridge_bytes_come_at_its_ticks_and_nobody_looks_in_betwe
         2 * BYTE_S <= answer - when <= 2 * BYTE_S + TICK_S + 1e-4 for when, answer in zip(moments, came, strict=True)
     )
     assert rig.steps - steps <= 0.4 / QUIET_SLICE_S + 0.4 / TICK_S + 2 * 20 + 10
+
+
+def test_a_delivery_finds_the_chip_nearly_there_and_goes_before_all_other_work():
+    """What a delivery waits for is a short run: the chip was brought up to AHEAD_S before, and records come after."""
+    rig = Rig([(0.0, "open"), *((0.1 + 0.0131 * n, b"a") for n in range(20))], usb="16u2", boot_s=None)
+    rig.bridge.run(seconds=0.1)
+    done: list[tuple[str, int]] = []
+    run, write, looks = rig.uno.run, rig.line.write, rig.line.baud
+    rig.uno.run = lambda cycles: (done.append(("run", cycles)), run(cycles=cycles))
+    rig.line.write = lambda data: (done.append(("write", len(data))), write(data))[1]
+    rig.line.baud = lambda: (done.append(("look", 0)), looks())[1]
+    rig.bridge._follow_baud = True
+    rig.bridge._after_run = lambda: done.append(("record", 0))
+    rig.bridge.run(seconds=0.4)
+    writes = [at for at, (what, _) in enumerate(done) if what == "write"]
+    assert len(writes) == 20
+    for at in writes:
+        assert done[at - 1][0] == "run"
+        assert done[at - 1][1] <= 2 * AHEAD_S * CLOCK_HZ
+        assert done[at - 2][0] == "record", "nobody looked at the line before this run"
+        assert done[at + 1][0] == "record"
+    assert sum(what == "look" for what, _ in done) >= 0.4 / (2 * QUIET_SLICE_S), "at other times somebody does"
 
 
 def test_a_full_ring_is_filled_again_before_it_runs_dry():

@@ -127,7 +127,12 @@ def test_a_host_that_reads_nothing_takes_so_much_and_no_more():
 def test_waiting_on_a_closed_terminal_sleeps_instead_of_spinning(monkeypatch):
     with PtyLine() as line:
         watched = []
-        monkeypatch.setattr("select.select", lambda fds, *_: watched.append(list(fds)))
+
+        def select(fds, *_):
+            watched.append(list(fds))
+            return [], [], []
+
+        monkeypatch.setattr("select.select", select)
         line.wait(0.0, for_bytes=True)
         master = line._fd
         assert master not in watched[0]

@@ -37,6 +37,9 @@ LEAST_SLICE_S = 0.000_02
 QUIET_SLICE_S = 0.002
 """Longest sleep otherwise: how late an opened port, a stop or the board's first byte may be noticed."""
 
+AHEAD_S = 0.000_3
+"""Real speed: the chip is brought up to date so long before a delivery of the USB bridge: a short run is left then."""
+
 QUIET_AFTER_S = 0.005
 """The line counts as lively for so long after its last byte: a firmware's answer may be under way."""
 
@@ -112,6 +115,9 @@ class Bridge:
         self._say = say
         self._after_run = after_run
         self._is_open = False
+        self._stirred = True  # something happened on the line that is not looked at yet
+        self._slept_s = 0.0
+        self._look_at_s = 0.0  # the latest moment for the next look
         self._dtr_stayed_up = False
         self._opened = self._from_host = self._to_host = self._lost = 0
         self._lag_given_up_s = 0.0
@@ -136,7 +142,7 @@ class Bridge:
 
     def step(self, end_cycle: int | None = None) -> None:
         """Run the chip up to now (at most to `end_cycle`), serve the line, and sleep for the time that is left."""
-        self._notice_open()
+        self._look_at_the_line()
         if self._boots_at_s is not None:
             self._stay_in_reset(self._boots_at_s)
             return
@@ -146,14 +152,22 @@ class Bridge:
             target = min(target, end_cycle)
         if target > uno.cycle:
             uno.run(cycles=target - uno.cycle)
-            self._after_run()
         self._to_line()
         self._from_line()
+        self._after_run()  # last: what is recorded can wait, the host does not
         self._sleep()
 
     def resume(self) -> None:
         """Go on after a while in which the board stood still and the clock did not: nothing is to be made up."""
         self._anchor_s, self._anchor_cycle = self._clock.now_s(), self._uno.cycle
+
+    def _look_at_the_line(self) -> None:
+        """Notice what hosts did, unless nothing stirred in a short sleep just after a look: deliveries come first."""
+        now_s = self._clock.now_s()
+        if self._real and not self._stirred and self._slept_s <= 2 * AHEAD_S and now_s < self._look_at_s:
+            return
+        self._look_at_s = now_s + QUIET_SLICE_S
+        self._notice_open()
 
     def _notice_open(self) -> None:
         if self._line.opened():
@@ -225,7 +239,8 @@ class Bridge:
             return
         if fresh:
             self._lively()
-        taken = self._line.write(data) if self._is_open else 0  # else the next host would read old bytes
+        self._is_open = self._is_open and self._line.is_open()  # else the next host would read old bytes
+        taken = self._line.write(data) if self._is_open else 0
         self._to_host += taken
         if self._uno.serial.bridge is None or not self._is_open:
             self._lost += len(data) - taken
@@ -244,7 +259,8 @@ class Bridge:
     def _sleep(self) -> None:
         if self._real:
             ahead_s = (self._uno.cycle - self._anchor_cycle) / CLOCK_HZ - (self._clock.now_s() - self._anchor_s)
-            self._line.wait(ahead_s + self._slice_s(), for_bytes=self._uno.serial.room > 0)
+            self._slept_s = ahead_s + self._slice_s()
+            self._stirred = self._line.wait(self._slept_s, for_bytes=self._uno.serial.room > 0)
 
     def _slice_s(self) -> float:
         """How much emulated time may pass before the line wants to be served, unless the host sends something."""
@@ -252,7 +268,8 @@ class Bridge:
         if serial.bridge is None:
             most_s = QUIET_SLICE_S if self._is_quiet() else LIVELY_SLICE_S
         else:  # the USB bridge hands bytes over at moments that are known before
-            most_s = min(QUIET_SLICE_S, (serial.next_delivery_cycle - cycle) / CLOCK_HZ)
+            due_s = (serial.next_delivery_cycle - cycle) / CLOCK_HZ
+            most_s = min(QUIET_SLICE_S, due_s if due_s < 2 * AHEAD_S or self._is_quiet() else due_s - AHEAD_S)
         if serial.room == 0:  # the host waits with more bytes, and those under way must not run out before
             most_s = min(most_s, (serial.idle_cycle - cycle) / CLOCK_HZ / 2)
         return max(most_s, LIVELY_SLICE_S if serial.bridge is None else LEAST_SLICE_S)

@@ -51,6 +51,9 @@ class Line(Protocol):
         """Hand bytes to the host; returns how many fitted into its buffer."""
         ...
 
-    def wait(self, timeout_s: float, *, for_bytes: bool) -> None:
-        """Sleep for `timeout_s`, or, when `for_bytes`, until the host sends or closes, if that comes first."""
+    def wait(self, timeout_s: float, *, for_bytes: bool) -> bool:
+        """Sleep for `timeout_s`, or, when `for_bytes`, until the host sends or closes, if that comes first.
+
+        Returns whether something happened on the line; a line that cannot tell says True.
+        """
         ...

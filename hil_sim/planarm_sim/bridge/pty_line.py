@@ -103,13 +103,17 @@ class PtyLine:
         except BlockingIOError:
             return 0
 
-    def wait(self, timeout_s: float, *, for_bytes: bool) -> None:
-        """Sleep for `timeout_s`, or until a host opens or, when `for_bytes`, sends or closes, if that comes first."""
+    def wait(self, timeout_s: float, *, for_bytes: bool) -> bool:
+        """Sleep for `timeout_s`, or until a host opens or, when `for_bytes`, sends or closes, if that comes first.
+
+        Returns whether one of these happened; True also where openings cannot be watched.
+        """
         # A terminal nobody has open reports a hang-up at once, for ever: it must not be waited for.
         watched = [self._fd] if for_bytes and self.is_open() else []
         if self._watch is not None:
             watched.append(self._watch.fd)
-        select.select(watched, [], [], max(timeout_s, 0.0))
+        ready, _, _ = select.select(watched, [], [], max(timeout_s, 0.0))
+        return bool(ready) or self._watch is None
 
     def close(self) -> None:
         """Remove the link, if it is still this terminal's, and close the terminal."""
