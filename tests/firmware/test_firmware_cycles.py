@@ -19,8 +19,9 @@ from planarm_wire.messages import STEP_PINS, Fault, Query, Segment, Segments, St
 IMAGE = Path(__file__).parents[2] / "firmware" / "release" / "uno.hex"
 JUMP_TO_ITSELF = b"\xff\xcf"  # rjmp .-2
 
-STEP_CYCLES, ONWARD_CYCLES, REVERSED_CYCLES, IDLE_CYCLES = 78, 82, 92, 77
-MISSED_CYCLES, MISSED_ONWARD_CYCLES, MISSED_REVERSED_CYCLES = 85, 89, 99
+STEP_CYCLES, ONWARD_CYCLES, REVERSED_CYCLES, IDLE_CYCLES = 75, 75, 77, 73
+MISSED_CYCLES = 82
+HIGH_CYCLES = range(56, 60)  # nothing else runs but an instruction of the main program
 RECEIVE_CYCLES, OVERRUN_CYCLES, FULL_CYCLES = 40, 44, 40
 TRANSMIT_CYCLES = (34, 36)
 
@@ -73,16 +74,11 @@ def test_step_interrupts(tracer: Tracer, joint: int) -> None:
     assert tracer.taken(RECEIVE) <= {RECEIVE_CYCLES}
     assert tracer.taken(TRANSMIT) <= set(TRANSMIT_CYCLES)
     if joint == 0:
-        assert min(highs(board)) >= 48
+        assert set(highs(board)) <= set(HIGH_CYCLES)
 
 
-@pytest.mark.parametrize(
-    ("steps", "turns", "cycles"),
-    [(9, False, MISSED_CYCLES), (1, False, MISSED_ONWARD_CYCLES), (1, True, MISSED_REVERSED_CYCLES)],
-)
-def test_an_interrupt_that_comes_too_late_stops_both_joints(
-    tracer: Tracer, steps: int, turns: bool, cycles: int
-) -> None:
+@pytest.mark.parametrize(("steps", "turns"), [(9, False), (1, False), (1, True)])
+def test_an_interrupt_that_comes_too_late_stops_both_joints(tracer: Tracer, steps: int, turns: bool) -> None:
     # Held up by more than an interval, after a step of a run, and after the last one of a run.
     motion = [
         segment_of(700 * steps, run_of(steps, first=0, interval=700, positive=not (turns and i % 2))) for i in range(8)
@@ -91,7 +87,7 @@ def test_an_interrupt_that_comes_too_late_stops_both_joints(
     tracer.run_until(lambda: len(tracer.taken(STEP_1)) > 0)
     tracer.hold_interrupts(1500)
     board.run(400)
-    assert [taken for number, taken in tracer.done if number == STEP_1][-1] == cycles
+    assert [taken for number, taken in tracer.done if number == STEP_1][-1] == MISSED_CYCLES
     status = board.ask()
     assert status.fault is Fault.MISSED_DEADLINE
     assert status.ledger.position_usteps == (board.position_at(0, board.now), 0)

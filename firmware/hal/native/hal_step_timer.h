@@ -113,6 +113,19 @@ bool step_is_high() {
     return board::is_high(JOINT);
 }
 
+inline uint8_t step_levels() {
+    uint8_t levels = 0;
+    for (uint8_t joint = 0; joint < planarm::wire::JOINTS; ++joint) {
+        if (board::is_high(joint)) levels |= static_cast<uint8_t>(1 << joint);
+    }
+    return levels;
+}
+
+template <uint8_t JOINT>
+bool step_level(uint8_t levels) {
+    return (levels >> JOINT & 1) != 0;
+}
+
 template <uint8_t JOINT>
 void step_forget_match() {
     board::forget_match(JOINT);

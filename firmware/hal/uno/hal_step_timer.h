@@ -168,6 +168,16 @@ HAL_INLINE bool step_is_high() {
     return output<JOINT>() == Output::COMPARE && read_pin(planarm::wire::STEP_PINS[JOINT]);
 }
 
+// All step pins that the compare outputs drive, in one instruction; step_level tells a joint's.
+HAL_INLINE uint8_t step_levels() { return ALL_DISARMED != 0 ? PINB : 0; }
+
+template <uint8_t JOINT>
+HAL_INLINE bool step_level(uint8_t levels) {
+    static_assert(output<JOINT>() != Output::COMPARE || port_of(planarm::wire::STEP_PINS[JOINT]) == Port::B,
+                  "OC1A and OC1B are on port B");
+    return output<JOINT>() == Output::COMPARE && (levels & mask_of(planarm::wire::STEP_PINS[JOINT])) != 0;
+}
+
 // Forgets a match that nobody waited for.
 template <uint8_t JOINT>
 HAL_INLINE void step_forget_match() {

@@ -2,22 +2,22 @@
 //
 // No compiled or library code uses r2 to r15: platformio.ini keeps the compiler off them, build.py checks the
 // linked program. The interrupts, which never nest, need no stack. Here they hold
-//   r2         the status register         r8 to r11  interval, then edge (r8, r9)
+//   r2         the status register         r8 to r11  interval; at a turn DIR's port
 //   r4, r5     the interrupted code's Z    r12, r13   fraction of joint 1
-//   r6, r7     its r24 and r25             r14, r15   fraction of joint 2
+//   r6, r7     the next edge               r14, r15   fraction of joint 2
 //   r3         a byte on its way
 //
 // Cycles from the match, if nothing else runs, with entry (4) and the jump from the vector (3):
 //                            all    pin falls   look at the timer   next edge placed
-//   one step after another    78       58              60                71
-//   on in one direction       82       59              61                75
-//   on and back               92       59              71                85
-//   going idle                77       59
-//   a step missed             85, after the last of a run 89, after a change of DIR 99
+//   one step after another    75       56              58                69
+//   on in one direction       75       56              58                69
+//   on and back               77       56              59                71
+//   going idle                73       56
+//   a step missed             82
 // tests/firmware/test_firmware_cycles.py counts them. The least interval of one joint covers what may run
 // when its step rises: the receive interrupt (40), a lock of the main program (11), the other joint's
-// interrupt (78), one more lock (11), its own way to the look at the timer (60), and what that asks for (38):
-// 238. From a step to one back the look comes after 71 and asks for the DIR setup time (320).
+// interrupt (75, in a turn 77), its own way to the look at the timer (58), and what that asks for (38): 224.
+// From a step to one back the look comes after 59 and asks for the DIR setup time (320).
 
 #include <avr/interrupt.h>
 #include <avr/io.h>
@@ -43,6 +43,11 @@ static_assert(_SFR_MEM_ADDR(TCCR1C) == _SFR_MEM_ADDR(TCCR1A) + 2, "%[tccra] + 2"
 static_assert(_SFR_MEM_ADDR(TCNT1) == _SFR_MEM_ADDR(TCCR1A) + 4, "%[tccra] + 4");
 static_assert(_SFR_MEM_ADDR(TIMSK2) == _SFR_MEM_ADDR(TIMSK1) + 1, "%[timsk] + 1");
 static_assert(sizeof(Run*) == 2 && sizeof(bool) == 1, "widths of loads");
+// At a turn DIR's port is read before the pulse falls and written after it.
+static_assert(hal::output<0>() != hal::Output::COMPARE ||
+                  (port_of(wire::DIR_PINS[0]) != port_of(wire::STEP_PINS[0]) &&
+                   port_of(wire::DIR_PINS[1]) != port_of(wire::STEP_PINS[1])),
+              "no step pin that changes in between");
 
 // The first of the joint's two registers for the fraction; the assembler takes registers by number.
 constexpr uint8_t fraction_register(uint8_t joint) { return joint == 0 ? 12 : 14; }
@@ -56,24 +61,23 @@ HAL_INLINE void step_interrupt() {
         .endif
         in   r2, %[sreg]
         movw r4, r30
-        movw r6, r24
         lds  r30, %[active]
         lds  r31, %[active] + 1
-        in   r24, %[left]               ; count the step
-        dec  r24
-        out  %[left], r24
+        in   r3, %[left]                ; count the step
+        dec  r3
+        out  %[left], r3
         breq 1f
 
         ldd  r8, Z + %[interval]
         ldd  r9, Z + %[interval] + 1
         ldd  r10, Z + %[interval] + 2
         ldd  r11, Z + %[interval] + 3
-        lds  r24, %[ocr]                ; the next edge
-        lds  r25, %[ocr] + 1
+        lds  r6, %[ocr]                 ; the next edge
+        lds  r7, %[ocr] + 1
         add  %[part], r8
         adc  %[part] + 1, r9
-        adc  r24, r10
-        adc  r25, r11
+        adc  r6, r10
+        adc  r7, r11
         ldd  r3, Z + %[add]             ; interval += add
         add  r8, r3
         std  Z + %[interval], r8
@@ -86,120 +90,113 @@ HAL_INLINE void step_interrupt() {
         ldd  r3, Z + %[add] + 3
         adc  r11, r3
         std  Z + %[interval] + 3, r11
-        movw r8, r24
+    8:
         .if %[by_match]
         rjmp .+0                        ; the pulse rose 9 cycles after the match
         rjmp .+0
         rjmp .+0
         rjmp .+0
-        rjmp .+0
         cbi  %[step_port], %[step_bit]  ; fall
         .else
-        ldi  r24, %[foc]                ; fall
-        sts  %[tccra] + 2, r24
+        ldi  r30, %[foc]                ; fall
+        sts  %[tccra] + 2, r30
         .endif
-        lds  r24, %[tccra] + 4               ; late?
-        lds  r25, %[tccra] + 5
-        subi r24, lo8(-(%[step_margin]))
-        sbci r25, hi8(-(%[step_margin]))
-        cp   r8, r24
-        cpc  r9, r25
+        lds  r30, %[tccra] + 4          ; late?
+        lds  r31, %[tccra] + 5
+        subi r30, lo8(-(%[step_margin]))
+        sbci r31, hi8(-(%[step_margin]))
+        cp   r6, r30
+        cpc  r7, r31
         brmi 5f
-        sts  %[ocr] + 1, r9
-        sts  %[ocr], r8
-        movw r24, r6
+    9:  sts  %[ocr] + 1, r7
+        sts  %[ocr], r6
         movw r30, r4
         out  %[sreg], r2
         reti
 
-    1:  ldd  r24, Z + %[next]           ; the run is done
-        ldd  r25, Z + %[next] + 1
-        sts  %[active], r24
-        sts  %[active] + 1, r25
-        movw r30, r24
-        ldd  r24, Z + %[steps]
-        out  %[left], r24
+    1:  ldd  r6, Z + %[next]            ; the run is done
+        ldd  r7, Z + %[next] + 1
+        sts  %[active], r6
+        sts  %[active] + 1, r7
+        movw r30, r6
+        ldd  r3, Z + %[steps]
+        out  %[left], r3
         ldd  %[part], Z + %[fraction]
         ldd  %[part] + 1, Z + %[fraction] + 1
-        ldd  r8, Z + %[first]
-        ldd  r9, Z + %[first] + 1
+        ldd  r6, Z + %[first]
+        ldd  r7, Z + %[first] + 1
         ldd  r3, Z + %[chained]
+        ldd  r8, Z + %[dir_high]        ; what DIR's port will be
+        in   r9, %[dir_port]
+        bst  r8, 0
+        bld  r9, %[dir_bit]
         rjmp .+0                        ; the pulse is as long as any other
-        rjmp .+0
-        rjmp .+0
-        rjmp .+0
-        rjmp .+0
-        rjmp .+0
-        .if %[by_match]
-        rjmp .+0                        ; the pulse rose 9 cycles after the match
-        rjmp .+0
-        rjmp .+0
-        rjmp .+0
-        rjmp .+0
-        cbi  %[step_port], %[step_bit]  ; fall
-        .else
-        ldi  r24, %[foc]                ; fall
-        sts  %[tccra] + 2, r24
-        .endif
+        nop
         tst  r3
         breq 4f
-        sbrc r3, 1
-        rjmp 3f
-        ldi  r30, lo8(%[step_margin])
-        ldi  r31, hi8(%[step_margin])
-    7:  lds  r24, %[tccra] + 4               ; late?
-        lds  r25, %[tccra] + 5
-        add  r24, r30
-        adc  r25, r31
-        cp   r8, r24
-        cpc  r9, r25
-        brmi 5f
-        sts  %[ocr] + 1, r9
-        sts  %[ocr], r8
-        movw r24, r6
-        movw r30, r4
-        out  %[sreg], r2
-        reti
+        sbrs r3, 1
+        rjmp 8b
 
-    5:  lds  r24, %[timsk]              ; a step is missed
-        .if %[joints] > 2
-        lds  r25, %[scheduled_on]
-        or   r24, r25
-        .endif
-        sts  %[missed], r24
-        ldi  r24, %[all_disarmed]
-        sts  %[tccra], r24
-        ldi  r24, 0
-        sts  %[timsk], r24
-        .if %[joints] > 2
-        sts  %[scheduled_on], r24
-        sts  %[timsk] + 1, r24
-        .endif
-        movw r24, r6
-        movw r30, r4
-        out  %[sreg], r2
-        reti
-
-    3:  ldd  r25, Z + %[dir_high]       ; turn round
-        sbrc r25, 0
+        nop                             ; turn round
+        .if %[by_match]
+        rjmp .+0
+        rjmp .+0
+        rjmp .+0
+        rjmp .+0
+        cbi  %[step_port], %[step_bit]
+        sbrc r8, 0
         sbi  %[dir_port], %[dir_bit]
-        sbrs r25, 0
+        sbrs r8, 0
         cbi  %[dir_port], %[dir_bit]
-        ldi  r30, lo8(%[dir_margin])
-        ldi  r31, hi8(%[dir_margin])
-        rjmp 7b
-
-    4:
-        .if !%[by_match]
-        lds  r24, %[tccra]              ; go idle
-        andi r24, %[other]
-        ori  r24, %[disarmed]
-        sts  %[tccra], r24
+        .else
+        ldi  r30, %[foc]
+        sts  %[tccra] + 2, r30
+        out  %[dir_port], r9
         .endif
-        lds  r24, %[timsk]
-        andi r24, %[silent]
-        sts  %[timsk], r24
-        movw r24, r6
+        lds  r30, %[tccra] + 4          ; late?
+        lds  r31, %[tccra] + 5
+        subi r30, lo8(-(%[dir_margin]))
+        sbci r31, hi8(-(%[dir_margin]))
+        cp   r6, r30
+        cpc  r7, r31
+        brpl 9b
+
+    5:  lds  r30, %[timsk]              ; a step is missed
+        .if %[joints] > 2
+        lds  r31, %[scheduled_on]
+        or   r30, r31
+        .endif
+        sts  %[missed], r30
+        ldi  r30, %[all_disarmed]
+        sts  %[tccra], r30
+        ldi  r30, 0
+        sts  %[timsk], r30
+        .if %[joints] > 2
+        sts  %[scheduled_on], r30
+        sts  %[timsk] + 1, r30
+        .endif
+        movw r30, r4
+        out  %[sreg], r2
+        reti
+
+    4:  rjmp .+0                        ; go idle
+        .if %[by_match]
+        rjmp .+0
+        rjmp .+0
+        rjmp .+0
+        rjmp .+0
+        cbi  %[step_port], %[step_bit]
+        .else
+        ldi  r30, %[foc]
+        sts  %[tccra] + 2, r30
+        lds  r30, %[tccra]
+        andi r30, %[other]
+        ori  r30, %[disarmed]
+        sts  %[tccra], r30
+        .endif
+        lds  r30, %[timsk]
+        andi r30, %[silent]
+        sts  %[timsk], r30
         movw r30, r4
         out  %[sreg], r2
         reti
