@@ -29,6 +29,7 @@ from planarm_wire.messages import (
     DIR_PINS,
     ENABLE_PIN,
     HOST_WINDOW_BYTES,
+    MIN_INTERVAL_TICKS,
     MIN_STEP_HIGH_TICKS,
     MIN_STEP_LOW_TICKS,
     PROTOCOL_VERSION,
@@ -271,6 +272,42 @@ def test_constant_rates_on_a_saturated_line(
     board.receive(bytes([DELIMITER]))
     status = board.ask()
     assert_every_edge(board, motion, status)
+
+
+class LedgerReader(Streamer):
+    """Keeps what the ledger told, and for when."""
+
+    def __init__(self, board: Board, segments: list[Segment]) -> None:
+        super().__init__(board, segments, busy_line=True)
+        self.told: list[tuple[int, tuple[int, ...]]] = []
+
+    def take_reply(self, acknowledged: int, reply: object) -> None:
+        super().take_reply(acknowledged, reply)
+        assert isinstance(reply, Status)
+        self.told.append((reply.mcu_ticks, reply.ledger.position_usteps))
+
+
+def test_the_ledger_is_exact_at_its_tick_between_the_steps(emulated_firmware: EmulatedFirmware) -> None:
+    # Both joints at the board's rate in all phases, a pulse or an interrupt at nearly every moment. What the ledger
+    # tells must be the steps that have risen at its tick; the tick of cycle 0 is the same for all.
+    motion = end_motion(fast(MIN_INTERVAL_TICKS, 1.0037, 250_000, 16))
+    board = Board(emulated_firmware)
+    board.get_ready()
+    for segment in motion[:12]:
+        board.ask(Segments(0, 0, 0, (segment,)))
+    board.ask(Start(LEAD_TICKS))
+    reader = LedgerReader(board, motion[12:])
+    reader.run(len(motion), 12_000_000)
+    moving = [(tick, told) for tick, told in reader.told if 0 < told[0] < len(board.rises(0))]
+    assert len(moving) >= 60
+    fitting: set[int] | None = None
+    for tick, told in moving:
+        risen = [board.rises(joint) for joint in range(2)]
+        earliest = max(rises[count - 1] for rises, count in zip(risen, told, strict=True))
+        latest = min(rises[count] for rises, count in zip(risen, told, strict=True))
+        zeros = set(range(earliest - tick, latest - tick))
+        fitting = zeros if fitting is None else fitting & zeros
+    assert fitting, "no tick of cycle 0 explains all ledgers"
 
 
 def test_more_bytes_than_the_ring_holds_are_counted_and_harmless(emulated_firmware: EmulatedFirmware) -> None:
