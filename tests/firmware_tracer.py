@@ -33,6 +33,7 @@ class Tracer(EmulatedFirmware):
 
     def hold_interrupts(self, ticks: int) -> None:
         """Let the main program run on for a while as if it had switched interrupts off."""
+        self.run_until(lambda: bool(self.chip.sreg & INTERRUPTS_ON))  # an interrupt, or a lock, would switch them on
         self.chip.sreg &= ~INTERRUPTS_ON
         self.uno.run(cycles=ticks)
         self.chip.sreg |= INTERRUPTS_ON
