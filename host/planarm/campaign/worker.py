@@ -9,6 +9,7 @@ import threading
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
+from multiprocessing import resource_tracker
 
 from planarm.campaign.self_test import run_self_test
 from planarm.campaign.task import Batch, Figures, Row, Task, task_key
@@ -75,12 +76,17 @@ def _limit_memory(memory_mb: int) -> None:
 
 @contextmanager
 def started_deaf_to_ctrl_c() -> Iterator[None]:
-    """Start processes that ignore Ctrl-C from their first instruction on, also while they import."""
-    if threading.current_thread() is not threading.main_thread():  # which alone may say what becomes of a signal
+    """Start processes that do not hear Ctrl-C from their first instruction on, also while they import.
+
+    A Ctrl-C meanwhile is kept for the end of the context, unless another thread takes it. On Windows, where nothing can
+    be kept back, workers hear it until `leave_ctrl_c_to_parent`.
+    """
+    if sys.platform == "win32":
         yield
         return
-    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    resource_tracker.ensure_running()  # its start would let the signal through again (CPython below 3.13)
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
         yield
     finally:
-        signal.signal(signal.SIGINT, before)
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
