@@ -7,9 +7,10 @@ namespace clock {
 
 namespace {
 uint32_t latest_ticks;
-}
+uint32_t begun_ticks;  // when the pass began
+}  // namespace
 
-void reset(uint32_t ticks) { latest_ticks = ticks; }
+void reset(uint32_t ticks) { latest_ticks = begun_ticks = ticks; }
 
 uint32_t extend(uint16_t counter) {
     latest_ticks += static_cast<uint16_t>(counter - static_cast<uint16_t>(latest_ticks));
@@ -24,6 +25,12 @@ uint32_t now() {
     }
     return extend(counter);
 }
+
+void begin_pass() { begun_ticks = now(); }
+
+uint32_t pass_ticks() { return begun_ticks; }
+
+int32_t ticks_until(uint32_t ticks) { return static_cast<int32_t>(ticks - begun_ticks); }
 
 }  // namespace clock
 }  // namespace planarm

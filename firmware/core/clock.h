@@ -16,5 +16,13 @@ uint32_t extend(uint16_t counter);
 // Ticks now.
 uint32_t now();
 
+// Looks at the clock for a pass of the main program: what follows are that moment's, for all that the pass
+// does.
+void begin_pass();
+uint32_t pass_ticks();
+// Ticks until then; below 0 when that is past.
+int32_t ticks_until(uint32_t ticks);
+inline bool has_come(uint32_t ticks) { return ticks_until(ticks) <= 0; }
+
 }  // namespace clock
 }  // namespace planarm

@@ -1,15 +1,13 @@
-// The host's commands, all but HELLO and SEGMENTS: reads their fields, asks the supervisor, carries them out.
+// The host's commands, all but HELLO and SEGMENTS: checks their fields, asks the supervisor, carries them
+// out.
 #pragma once
 
-#include <stdint.h>
-
-#include "messages.h"
-#include "reader.h"
+#include "frame_receiver.h"
 
 namespace planarm {
 namespace commands {
 
-wire::Result execute(wire::MessageType type, Reader& fields, uint32_t now_ticks);
+wire::Result execute(const Frame& frame);
 
 }  // namespace commands
 }  // namespace planarm

@@ -26,7 +26,6 @@ constexpr uint8_t PASSES_A_LOOK = 4;
 constexpr uint8_t BYTES_A_PASS = 8;
 
 FrameReceiver receiver;
-uint8_t reply_bytes[reply::MAX_ENCODED];
 uint8_t seen_holds;
 uint8_t passes;
 
@@ -39,75 +38,73 @@ uint32_t mix(uint32_t count) {
     return mixed ^ (mixed >> 13);
 }
 
-void tell(supervisor::Event event, uint32_t now_ticks) {
-    supervisor::apply(event, now_ticks);
+void tell(supervisor::Event event) {
+    supervisor::apply(event);
     session::announce();
 }
 
-void fail(wire::Fault fault, uint8_t detail, uint32_t now_ticks) {
-    supervisor::fail(fault, detail, now_ticks);
+void fail(wire::Fault fault, uint8_t detail = 0) {
+    supervisor::fail(fault, detail);
     session::announce();
 }
 
-void serve_emergency(uint32_t now_ticks) {
+void serve_emergency() {
     if (supervisor::state() == wire::State::FAULT) return;
     const bool open = power::has_option(power::STOP_INPUT) && (hal::inputs() & hal::STOP_INPUT_OPEN) != 0;
     const hal::Emergency emergency = hal::emergency();
     if (emergency == hal::Emergency::NONE && !open) return;
-    fail(emergency == hal::Emergency::LINE ? wire::Fault::EMERGENCY_STOP : wire::Fault::STOP_INPUT, 0,
-         now_ticks);
+    fail(emergency == hal::Emergency::LINE ? wire::Fault::EMERGENCY_STOP : wire::Fault::STOP_INPUT);
     if (power::has_option(power::EMERGENCY_RELEASES)) power::release();
 }
 
 // A step was missed, or the interrupts were switched off by an emergency a moment ago.
-void missed(uint8_t joint, uint32_t now_ticks) {
-    if (hal::emergency() != hal::Emergency::NONE) return serve_emergency(now_ticks);
-    fail(wire::Fault::MISSED_DEADLINE, joint, now_ticks);
+void missed(uint8_t joint) {
+    if (hal::emergency() != hal::Emergency::NONE) return serve_emergency();
+    fail(wire::Fault::MISSED_DEADLINE, joint);
 }
 
-void serve_motion(uint32_t now_ticks) {
+void serve_motion() {
     using supervisor::Event;
-    switch (motion::serve(now_ticks)) {
+    switch (motion::serve()) {
         case motion::Progress::GOING:
             return;
         case motion::Progress::DONE:
-            return tell(Event::DONE, now_ticks);
+            return tell(Event::DONE);
         case motion::Progress::AT_REST:
-            return tell(Event::AT_REST, now_ticks);
+            return tell(Event::AT_REST);
         case motion::Progress::STARVED:
-            return tell(Event::STARVED, now_ticks);
+            return tell(Event::STARVED);
         case motion::Progress::FED:
-            return tell(Event::FED, now_ticks);
+            return tell(Event::FED);
         case motion::Progress::MISSED:
-            return missed(0, now_ticks);
+            return missed(0);
         case motion::Progress::UNDERRUN:
-            return fail(wire::Fault::UNDERRUN, 0, now_ticks);
+            return fail(wire::Fault::UNDERRUN);
     }
 }
 
-void serve_homing(uint32_t now_ticks) {
-    switch (home::serve(now_ticks)) {
+void serve_homing() {
+    switch (home::serve()) {
         case home::Progress::NONE:
         case home::Progress::GOING:
             return;
         case home::Progress::DONE:
-            return tell(supervisor::Event::DONE, now_ticks);
+            return tell(supervisor::Event::DONE);
         case home::Progress::FAILED:
-            return fail(wire::Fault::HOMING_FAILED, home::joint(), now_ticks);
+            return fail(wire::Fault::HOMING_FAILED, home::joint());
         case home::Progress::MISSED:
-            return missed(home::joint(), now_ticks);
+            return missed(home::joint());
     }
 }
 
 // Limit switches in motion; while homing they are what is looked for.
-void serve_limits(uint32_t now_ticks) {
-    inputs::serve(now_ticks);
+void serve_limits() {
+    inputs::serve();
     switch (supervisor::state()) {
         case wire::State::RUNNING:
         case wire::State::HOLDING:
         case wire::State::STOPPING:
-            if (inputs::hit_joint() != wire::JOINTS)
-                fail(wire::Fault::LIMIT_SWITCH, inputs::hit_joint(), now_ticks);
+            if (inputs::hit_joint() != wire::JOINTS) fail(wire::Fault::LIMIT_SWITCH, inputs::hit_joint());
             return;
         case wire::State::READY:
             return inputs::excuse_hit();
@@ -116,37 +113,29 @@ void serve_limits(uint32_t now_ticks) {
     }
 }
 
-void serve_hold(uint32_t now_ticks) {
+void serve_hold() {
     const uint8_t holds = hal::hold_count();
     if (holds == seen_holds) return;
     seen_holds = holds;
-    tell(supervisor::Event::HOLD, now_ticks);
+    tell(supervisor::Event::HOLD);
 }
 
-void serve_rest(uint32_t now_ticks) {
+void serve_rest() {
     if (supervisor::state() == wire::State::RUNNING && ++passes % PASSES_A_LOOK != 0) return;
-    serve_homing(now_ticks);
-    serve_limits(now_ticks);
-    if (supervisor::state() == wire::State::READY && power::is_idle_too_long(now_ticks)) {
-        tell(supervisor::Event::RELEASE, now_ticks);
+    serve_homing();
+    serve_limits();
+    if (supervisor::state() == wire::State::READY && power::is_idle_too_long()) {
+        tell(supervisor::Event::RELEASE);
     }
 }
 
-void receive(uint32_t now_ticks) {
+void receive() {
     uint8_t byte;
     for (uint8_t i = 0; i < BYTES_A_PASS && hal::serial_read(byte); ++i) {
         const FrameReceiver::Event event = receiver.receive(byte);
         if (event == FrameReceiver::Event::DAMAGED) session::on_damage();
-        if (event == FrameReceiver::Event::FRAME) return session::on_frame(receiver.frame(), now_ticks);
+        if (event == FrameReceiver::Event::FRAME) return session::on_frame(receiver.frame());
     }
-}
-
-// Sends the reply that is due. True when there was one.
-bool reply() {
-    if (!hal::serial_can_send()) return false;
-    const uint8_t size = session::take_reply(reply_bytes);
-    if (size != 0) hal::serial_send(reply_bytes, size);
-    return size != 0;
 }
 
 }  // namespace
@@ -156,8 +145,8 @@ void set_up(const Boot& boot, uint32_t now_ticks) {
     clock::reset(now_ticks);
     motion::reset();
     home::reset();
-    power::reset(now_ticks);
-    inputs::reset(now_ticks);
+    power::reset();
+    inputs::reset();
     supervisor::reset();
     session::reset();
     seen_holds = hal::hold_count();
@@ -166,18 +155,18 @@ void set_up(const Boot& boot, uint32_t now_ticks) {
 
 void pass() {
     hal::watchdog_feed();
-    const uint32_t now_ticks = clock::now();
-    serve_emergency(now_ticks);  // before the motion wonders where its interrupts are
-    serve_motion(now_ticks);
+    clock::begin_pass();
+    serve_emergency();  // before the motion wonders where its interrupts are
+    serve_motion();
     if (motion::is_urgent()) return;
-    serve_hold(now_ticks);
-    serve_rest(now_ticks);
+    serve_hold();
+    serve_rest();
     hal::journal_serve();
-    if (reply()) return;
+    if (hal::serial_can_send() && session::send_reply()) return;
     if (session::is_busy()) {
-        session::advance(now_ticks);
+        session::advance();
     } else {
-        receive(now_ticks);
+        receive();
     }
 }
 

@@ -28,15 +28,15 @@ void FrameReceiver::append(uint8_t byte) {
         damaged_ = true;
         return;
     }
-    buffer_[count_++] = byte;
+    reinterpret_cast<uint8_t*>(&frame_)[count_++] = byte;
     crc_ = hal::crc_update(crc_, byte);
     if (count_ != PAYLOAD_AT) return;
 
     // A message followed by its own checksum leaves 0. The payload's checksum goes on from the header's.
-    const uint8_t length = buffer_[0];
+    const uint8_t length = frame_.length;
     damaged_ = crc_ != 0 || length > wire::MAX_PAYLOAD_BYTES;
     if (damaged_ || length == 0) return;
-    crc_ = static_cast<uint16_t>(buffer_[wire::HEADER_BYTES] | (buffer_[wire::HEADER_BYTES + 1] << 8));
+    crc_ = static_cast<uint16_t>(frame_.header_crc[0] | (frame_.header_crc[1] << 8));
     end_ = static_cast<uint8_t>(PAYLOAD_AT + length + wire::CRC_BYTES);
 }
 

@@ -8,12 +8,19 @@
 
 namespace planarm {
 
-// A checked frame; `payload` stays valid until the next byte is received.
+// A frame as it is on the line, unstuffed.
 struct Frame {
     uint8_t length;
     uint8_t seq;
     uint8_t type;
-    const uint8_t* payload;
+    uint8_t header_crc[wire::CRC_BYTES];
+    uint8_t payload[wire::MAX_PAYLOAD_BYTES + wire::CRC_BYTES];  // and its checksum
+
+    // The payload as a message of messages.h, which must be as long.
+    template <typename Message>
+    const Message& as() const {
+        return *reinterpret_cast<const Message*>(payload);
+    }
 };
 
 class FrameReceiver {
@@ -24,8 +31,8 @@ class FrameReceiver {
     // good frame.
     Event receive(uint8_t byte);
 
-    // The frame of the last FRAME event.
-    Frame frame() const { return {buffer_[0], buffer_[1], buffer_[2], buffer_ + PAYLOAD_AT}; }
+    // The frame of the last FRAME event; it stays until the next byte is received.
+    const Frame& frame() const { return frame_; }
 
   private:
     static constexpr uint8_t PAYLOAD_AT = wire::HEADER_BYTES + wire::CRC_BYTES;
@@ -33,7 +40,7 @@ class FrameReceiver {
     void append(uint8_t byte);
     Event finish();
 
-    uint8_t buffer_[PAYLOAD_AT + wire::MAX_PAYLOAD_BYTES + wire::CRC_BYTES];
+    Frame frame_;
     uint8_t count_ = 0;
     uint8_t end_ = PAYLOAD_AT;  // bytes that the frame has when complete, as far as known
     uint16_t crc_ = wire::CRC_INITIAL;

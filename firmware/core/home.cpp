@@ -1,5 +1,6 @@
 #include "home.h"
 
+#include "clock.h"
 #include "inputs.h"
 #include "segment.h"
 #include "step_engine.h"
@@ -17,7 +18,7 @@ constexpr uint32_t NEAR_TICKS = 32000;
 // Between two phases the joint stands still.
 constexpr uint32_t PAUSE_TICKS = 1600000;
 
-Order order;
+wire::Home order;
 Phase phase = Phase::NONE;
 uint32_t steps_left;
 uint32_t next_ticks;  // of the next step
@@ -33,9 +34,10 @@ void enter(Phase next, uint32_t steps, uint32_t start_ticks) {
 uint32_t interval_ticks() { return phase == Phase::APPROACH ? order.fast_ticks : order.slow_ticks; }
 
 // False when all steps of the phase were made.
-bool feed(uint32_t now_ticks) {
-    if (static_cast<int32_t>(next_ticks - now_ticks) > AHEAD_TICKS) return true;
-    if (steps_left == 0) return static_cast<int32_t>(next_ticks - now_ticks) > 0;
+bool feed() {
+    const int32_t ahead_ticks = clock::ticks_until(next_ticks);
+    if (ahead_ticks > AHEAD_TICKS) return true;
+    if (steps_left == 0) return ahead_ticks > 0;
     if (!step_engine::has_room(order.joint)) return true;
     const uint32_t interval = interval_ticks();
     step_engine::Piece piece;
@@ -43,7 +45,7 @@ bool feed(uint32_t now_ticks) {
     piece.interval_q16 = piece.add_q16 = 0;
     piece.fraction = 0;
     piece.steps = 1;
-    piece.positive = phase == Phase::BACK ? !order.positive : order.positive;
+    piece.positive = (order.positive == 1) != (phase == Phase::BACK);
     piece.near = !first_step && interval <= NEAR_TICKS;
     step_engine::append(order.joint, piece);
     first_step = false;
@@ -56,15 +58,15 @@ bool feed(uint32_t now_ticks) {
 
 void reset() { phase = Phase::NONE; }
 
-wire::Result check(const Order& told) {
+bool is_good(const wire::Home& told) {
     const bool slow_enough = told.fast_ticks >= MIN_REVERSAL_TICKS && told.slow_ticks >= told.fast_ticks &&
                              told.slow_ticks >= 2 * wire::DEBOUNCE_TICKS;
     const bool short_enough = told.slow_ticks <= wire::MAX_SEGMENT_TICKS;
-    const bool good = told.joint < wire::JOINTS && slow_enough && short_enough && told.back_usteps != 0;
-    return good ? wire::Result::OK : wire::Result::OUT_OF_RANGE;
+    return told.joint < wire::JOINTS && told.positive <= 1 && slow_enough && short_enough &&
+           told.back_usteps != 0;
 }
 
-void begin(const Order& told, uint32_t start_ticks) {
+void begin(const wire::Home& told, uint32_t start_ticks) {
     order = told;
     if (inputs::is_hit(order.joint)) {
         enter(Phase::BACK, order.back_usteps, start_ticks);
@@ -79,19 +81,19 @@ bool is_active() { return phase != Phase::NONE; }
 
 uint8_t joint() { return order.joint; }
 
-Progress serve(uint32_t now_ticks) {
+Progress serve() {
     if (phase == Phase::NONE) return Progress::NONE;
-    if (!step_engine::serve(now_ticks)) return Progress::MISSED;
+    if (!step_engine::serve()) return Progress::MISSED;
     const bool hit = inputs::is_hit(order.joint);
     const bool there = phase == Phase::BACK ? !hit : hit;
-    if (!there) return feed(now_ticks) ? Progress::GOING : Progress::FAILED;
+    if (!there) return feed() ? Progress::GOING : Progress::FAILED;
     step_engine::stop();
     switch (phase) {
         case Phase::APPROACH:
-            enter(Phase::BACK, order.back_usteps, now_ticks + PAUSE_TICKS);
+            enter(Phase::BACK, order.back_usteps, clock::pass_ticks() + PAUSE_TICKS);
             return Progress::GOING;
         case Phase::BACK:
-            enter(Phase::TOUCH, order.back_usteps, now_ticks + PAUSE_TICKS);
+            enter(Phase::TOUCH, order.back_usteps, clock::pass_ticks() + PAUSE_TICKS);
             return Progress::GOING;
         default:
             phase = Phase::NONE;

@@ -10,30 +10,21 @@
 namespace planarm {
 namespace home {
 
-struct Order {
-    uint8_t joint;
-    bool positive;  // the switch lies there
-    uint32_t fast_ticks;
-    uint32_t slow_ticks;
-    uint32_t most_usteps;
-    uint32_t back_usteps;
-};
-
 enum class Progress : uint8_t { NONE, GOING, DONE, FAILED, MISSED };
 
 // For start-up.
 void reset();
 
-// OK or OUT_OF_RANGE.
-wire::Result check(const Order& order);
-void begin(const Order& order, uint32_t start_ticks);
+// True when the order keeps the limits.
+bool is_good(const wire::Home& order);
+void begin(const wire::Home& order, uint32_t start_ticks);
 void cancel();
 
 bool is_active();
 uint8_t joint();
 
 // To be called often.
-Progress serve(uint32_t now_ticks);
+Progress serve();
 
 }  // namespace home
 }  // namespace planarm

@@ -1,5 +1,6 @@
 #include "inputs.h"
 
+#include "clock.h"
 #include "hal_pins.h"
 #include "power.h"
 
@@ -25,17 +26,17 @@ bool is_set(uint8_t bits, uint8_t joint) { return ((bits >> joint) & 1) != 0; }
 
 }  // namespace
 
-void reset(uint32_t now_ticks) {
+void reset() {
     raw = steady = left = static_cast<uint8_t>(read() & JOINTS_MASK);
-    changed_ticks = now_ticks;
+    changed_ticks = clock::pass_ticks();
 }
 
-void serve(uint32_t now_ticks) {
+void serve() {
     const uint8_t now = static_cast<uint8_t>(read() & JOINTS_MASK);
     if (now != raw) {
         raw = now;
-        changed_ticks = now_ticks;
-    } else if (steady != raw && now_ticks - changed_ticks >= wire::DEBOUNCE_TICKS) {
+        changed_ticks = clock::pass_ticks();
+    } else if (steady != raw && clock::pass_ticks() - changed_ticks >= wire::DEBOUNCE_TICKS) {
         steady = raw;
         left &= steady;
     }

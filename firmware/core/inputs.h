@@ -9,10 +9,10 @@ namespace planarm {
 namespace inputs {
 
 // For start-up.
-void reset(uint32_t now_ticks);
+void reset();
 
 // To be called often.
-void serve(uint32_t now_ticks);
+void serve();
 
 // As debounced.
 bool is_hit(uint8_t joint);

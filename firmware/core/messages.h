@@ -226,121 +226,141 @@ enum class Result : int8_t {
     VERSION = -5,
 };
 
-// Hello: payload of 5 bytes.
-constexpr uint8_t HELLO_BYTES = 5;
-namespace hello_at {
-constexpr uint8_t PROTOCOL_VERSION = 0;  // u8
-constexpr uint8_t HOST_NONCE = 1;        // u32
-}  // namespace hello_at
+// Payloads of a fixed layout, byte by byte as they are on the wire.
+static_assert(__BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__, "the wire's numbers are little-endian, as here");
 
-// Query: payload of 0 bytes.
+// Ledger: 12 bytes with two joints.
+constexpr uint8_t LEDGER_BYTES = 4 + 4 * JOINTS;
+struct [[gnu::packed, gnu::may_alias]] Ledger {
+    uint32_t executed_segments;
+    int32_t position_usteps[JOINTS];
+};
+static_assert(sizeof(Ledger) == LEDGER_BYTES, "as on the wire");
+
+// Hello: 5 bytes.
+constexpr uint8_t HELLO_BYTES = 5;
+struct [[gnu::packed, gnu::may_alias]] Hello {
+    uint8_t protocol_version;
+    uint32_t host_nonce;
+};
+static_assert(sizeof(Hello) == HELLO_BYTES, "as on the wire");
+
+// Query: 0 bytes.
 constexpr uint8_t QUERY_BYTES = 0;
 
-// Enable: payload of 1 byte.
+// Enable: 1 byte.
 constexpr uint8_t ENABLE_BYTES = 1;
-namespace enable_at {
-constexpr uint8_t ON = 0;  // u8
-}  // namespace enable_at
+struct [[gnu::packed, gnu::may_alias]] Enable {
+    uint8_t on;
+};
+static_assert(sizeof(Enable) == ENABLE_BYTES, "as on the wire");
 
 // Segments: payload of 6 to 64 bytes.
 constexpr uint8_t SEGMENTS_MIN_BYTES = 4 + 1 * JOINTS;
 
-// Start: payload of 4 bytes.
+// Start: 4 bytes.
 constexpr uint8_t START_BYTES = 4;
-namespace start_at {
-constexpr uint8_t LEAD_TICKS = 0;  // u32, ticks
-}  // namespace start_at
+struct [[gnu::packed, gnu::may_alias]] Start {
+    uint32_t lead_ticks;
+};
+static_assert(sizeof(Start) == START_BYTES, "as on the wire");
 
-// Clear: payload of 0 bytes.
+// Clear: 0 bytes.
 constexpr uint8_t CLEAR_BYTES = 0;
 
-// Resume: payload of 0 bytes.
+// Resume: 0 bytes.
 constexpr uint8_t RESUME_BYTES = 0;
 
-// Override: payload of 1 byte.
+// Override: 1 byte.
 constexpr uint8_t OVERRIDE_BYTES = 1;
-namespace override_at {
-constexpr uint8_t PERCENT = 0;  // u8, %
-}  // namespace override_at
+struct [[gnu::packed, gnu::may_alias]] Override {
+    uint8_t percent;
+};
+static_assert(sizeof(Override) == OVERRIDE_BYTES, "as on the wire");
 
-// Stop: payload of 1 byte.
+// Stop: 1 byte.
 constexpr uint8_t STOP_BYTES = 1;
-namespace stop_at {
-constexpr uint8_t QUICK = 0;  // u8
-}  // namespace stop_at
+struct [[gnu::packed, gnu::may_alias]] Stop {
+    uint8_t quick;
+};
+static_assert(sizeof(Stop) == STOP_BYTES, "as on the wire");
 
-// Config: payload of 22 bytes.
+// Config: 22 bytes with two joints.
 constexpr uint8_t CONFIG_BYTES = 14 + 4 * JOINTS;
-namespace config_at {
-constexpr uint8_t PIN_MAP = 0;            // u8
-constexpr uint8_t JOINTS = 1;             // u8
-constexpr uint8_t DIR_INVERTED = 2;       // u8
-constexpr uint8_t OPTIONS = 3;            // u8
-constexpr uint8_t IDLE_MS = 4;            // u32, ms
-constexpr uint8_t WAKE_TICKS = 8;         // u32, ticks
-constexpr uint8_t HIGH_TICKS = 12;        // u16, ticks
-constexpr uint8_t START_STOP_TICKS = 14;  // u32 x JOINTS, ticks
-}  // namespace config_at
+struct [[gnu::packed, gnu::may_alias]] Config {
+    PinMap pin_map;
+    uint8_t joints;
+    uint8_t dir_inverted;
+    uint8_t options;
+    uint32_t idle_ms;
+    uint32_t wake_ticks;
+    uint16_t high_ticks;
+    uint32_t start_stop_ticks[JOINTS];
+};
+static_assert(sizeof(Config) == CONFIG_BYTES, "as on the wire");
 
-// SoftLimits: payload of 16 bytes.
+// SoftLimits: 16 bytes with two joints.
 constexpr uint8_t SOFT_LIMITS_BYTES = 8 * JOINTS;
-namespace soft_limits_at {
-constexpr uint8_t LEAST_USTEPS = 0;          // i32 x JOINTS, usteps
-constexpr uint8_t MOST_USTEPS = 4 * JOINTS;  // i32 x JOINTS, usteps
-}  // namespace soft_limits_at
+struct [[gnu::packed, gnu::may_alias]] SoftLimits {
+    int32_t least_usteps[JOINTS];
+    int32_t most_usteps[JOINTS];
+};
+static_assert(sizeof(SoftLimits) == SOFT_LIMITS_BYTES, "as on the wire");
 
-// Home: payload of 18 bytes.
+// Home: 18 bytes.
 constexpr uint8_t HOME_BYTES = 18;
-namespace home_at {
-constexpr uint8_t JOINT = 0;         // u8
-constexpr uint8_t POSITIVE = 1;      // u8
-constexpr uint8_t FAST_TICKS = 2;    // u32, ticks
-constexpr uint8_t SLOW_TICKS = 6;    // u32, ticks
-constexpr uint8_t MOST_USTEPS = 10;  // u32, usteps
-constexpr uint8_t BACK_USTEPS = 14;  // u32, usteps
-}  // namespace home_at
+struct [[gnu::packed, gnu::may_alias]] Home {
+    uint8_t joint;
+    uint8_t positive;
+    uint32_t fast_ticks;
+    uint32_t slow_ticks;
+    uint32_t most_usteps;
+    uint32_t back_usteps;
+};
+static_assert(sizeof(Home) == HOME_BYTES, "as on the wire");
 
-// SetPosition: payload of 8 bytes.
+// SetPosition: 8 bytes with two joints.
 constexpr uint8_t SET_POSITION_BYTES = 4 * JOINTS;
-namespace set_position_at {
-constexpr uint8_t POSITION_USTEPS = 0;  // i32 x JOINTS, usteps
-}  // namespace set_position_at
+struct [[gnu::packed, gnu::may_alias]] SetPosition {
+    int32_t position_usteps[JOINTS];
+};
+static_assert(sizeof(SetPosition) == SET_POSITION_BYTES, "as on the wire");
 
-// Welcome: payload of 31 bytes.
+// Welcome: 31 bytes with two joints.
 constexpr uint8_t WELCOME_BYTES = 23 + 4 * JOINTS;
-namespace welcome_at {
-constexpr uint8_t PROTOCOL_VERSION = 0;           // u8
-constexpr uint8_t HOST_NONCE = 1;                 // u32
-constexpr uint8_t BOOT_NONCE = 5;                 // u32
-constexpr uint8_t SPEC_HASH = 9;                  // u32
-constexpr uint8_t FIRMWARE_VERSION = 13;          // u8 x 3
-constexpr uint8_t RESET_CAUSE = 16;               // u8
-constexpr uint8_t INTERRUPTED = 17;               // u8
-constexpr uint8_t JOINTS = 18;                    // u8
-constexpr uint8_t LEDGER_EXECUTED_SEGMENTS = 19;  // u32
-constexpr uint8_t LEDGER_POSITION_USTEPS = 23;    // i32 x JOINTS, usteps
-}  // namespace welcome_at
+struct [[gnu::packed, gnu::may_alias]] Welcome {
+    uint8_t protocol_version;
+    uint32_t host_nonce;
+    uint32_t boot_nonce;
+    uint32_t spec_hash;
+    uint8_t firmware_version[3];
+    Reset reset_cause;
+    uint8_t interrupted;
+    uint8_t joints;
+    Ledger ledger;
+};
+static_assert(sizeof(Welcome) == WELCOME_BYTES, "as on the wire");
 
-// Status: payload of 30 bytes.
+// Status: 30 bytes with two joints.
 constexpr uint8_t STATUS_BYTES = 22 + 4 * JOINTS;
-namespace status_at {
-constexpr uint8_t STATE = 0;                      // u8
-constexpr uint8_t FAULT = 1;                      // u8
-constexpr uint8_t DETAIL = 2;                     // u8
-constexpr uint8_t REFUSAL = 3;                    // i8
-constexpr uint8_t REFUSAL_SEQ = 4;                // u8
-constexpr uint8_t FREE_BYTES = 5;                 // u16, bytes
-constexpr uint8_t CRC_ERRORS = 7;                 // u8
-constexpr uint8_t OVERRUNS = 8;                   // u8
-constexpr uint8_t RING_FULL = 9;                  // u8
-constexpr uint8_t HOLDS = 10;                     // u8
-constexpr uint8_t INPUTS = 11;                    // u8
-constexpr uint8_t OVERRIDE_PERCENT = 12;          // u8, %
-constexpr uint8_t RATE_PERCENT = 13;              // u8, %
-constexpr uint8_t MCU_TICKS = 14;                 // u32, ticks
-constexpr uint8_t LEDGER_EXECUTED_SEGMENTS = 18;  // u32
-constexpr uint8_t LEDGER_POSITION_USTEPS = 22;    // i32 x JOINTS, usteps
-}  // namespace status_at
+struct [[gnu::packed, gnu::may_alias]] Status {
+    State state;
+    Fault fault;
+    uint8_t detail;
+    Result refusal;
+    uint8_t refusal_seq;
+    uint16_t free_bytes;
+    uint8_t crc_errors;
+    uint8_t overruns;
+    uint8_t ring_full;
+    uint8_t holds;
+    uint8_t inputs;
+    uint8_t override_percent;
+    uint8_t rate_percent;
+    uint32_t mcu_ticks;
+    Ledger ledger;
+};
+static_assert(sizeof(Status) == STATUS_BYTES, "as on the wire");
 
 static_assert(HOST_WINDOW_BYTES < RX_RING_BYTES, "a full window fits the receive ring");
 

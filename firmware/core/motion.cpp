@@ -97,8 +97,6 @@ bool frozen;
 bool starved;  // frozen because the queue ran low
 uint32_t frozen_ticks;
 
-bool has_come(uint32_t ticks, uint32_t now_ticks) { return static_cast<int32_t>(now_ticks - ticks) >= 0; }
-
 // True when the path that is left after `path_ticks` of the segment is too short to rest on.
 bool is_starving(uint32_t path_ticks, uint32_t margin_ticks) {
     if (complete || segment_last || queue::free_bytes() < FULL_BYTES) return false;
@@ -192,12 +190,12 @@ bool fill_slice() {
     return true;
 }
 
-void prepare(uint32_t now_ticks) {
+void prepare() {
     urgent = false;
     if (!filling) {
         if (!in_segment) read_next_segment();  // as a rule ahead of time
         if (!in_segment) return;
-        const int32_t away_ticks = static_cast<int32_t>(prepare_ticks - now_ticks);
+        const int32_t away_ticks = clock::ticks_until(prepare_ticks);
         if (prepared_count == MAX_SLICES || away_ticks > PREPARE_AHEAD_TICKS) return;
         open_slice();
         urgent = !slice.is_plain();  // else there is time for a run, too
@@ -206,8 +204,8 @@ void prepare(uint32_t now_ticks) {
 }
 
 // Takes executed slices off the list. True when the last of them ended what was received.
-bool retire(uint32_t now_ticks, bool& ends_motion) {
-    while (prepared_count != 0 && has_come(prepared[0].end_ticks, now_ticks)) {
+bool retire(bool& ends_motion) {
+    while (prepared_count != 0 && clock::has_come(prepared[0].end_ticks)) {
         if (prepared[0].ends_segment) ++executed_segments;
         ends_motion = prepared[0].ends_motion;
         --prepared_count;
@@ -231,24 +229,24 @@ void clear() {
     for (uint8_t joint = 0; joint < wire::JOINTS; ++joint) queue_usteps[joint] = position.usteps[joint];
 }
 
-void thaw(uint32_t now_ticks) {
-    const uint32_t stood_ticks = now_ticks + THAW_LEAD_TICKS - frozen_ticks;
+void thaw() {
+    const uint32_t stood_ticks = clock::pass_ticks() + THAW_LEAD_TICKS - frozen_ticks;
     step_engine::shift(stood_ticks);
     for (uint8_t i = 0; i < prepared_count; ++i) prepared[i].end_ticks += stood_ticks;
     for (Cursor& cursor : cursors) cursor.shift(stood_ticks);
-    if (!has_come(begin_ticks, frozen_ticks)) begin_ticks += stood_ticks;
+    if (static_cast<int32_t>(begin_ticks - frozen_ticks) > 0) begin_ticks += stood_ticks;
     prepare_ticks += stood_ticks;
     slice.shift(stood_ticks);
     frozen = starved = false;
 }
 
 // True when the slice that is being executed lets the joints stop dead, or none is yet.
-bool may_freeze(uint32_t now_ticks) {
-    if (!has_come(begin_ticks, now_ticks)) return true;
+bool may_freeze() {
+    if (!clock::has_come(begin_ticks)) return true;
     return prepared_count != 0 && prepared[0].calm;
 }
 
-[[gnu::noinline]] Progress serve_frozen(uint32_t now_ticks) {
+[[gnu::noinline]] Progress serve_frozen() {
     if (wish != Wish::GO) {
         if (!starved) return Progress::GOING;
         starved = false;
@@ -256,14 +254,14 @@ bool may_freeze(uint32_t now_ticks) {
     }
     if (starved && is_starving(path_at, 2 * STARVING_MARGIN_TICKS)) return Progress::GOING;
     const bool was_starved = starved;
-    thaw(now_ticks);
+    thaw();
     return was_starved ? Progress::FED : Progress::GOING;
 }
 
-[[gnu::noinline]] Progress freeze_if_due(uint32_t now_ticks) {
+[[gnu::noinline]] Progress freeze_if_due() {
     const bool starving = wish == Wish::GO && is_starving(path_at, STARVING_MARGIN_TICKS);
     if (wish == Wish::GO && !starving) return Progress::GOING;
-    if (!may_freeze(now_ticks) || !step_engine::freeze(frozen_ticks)) return Progress::GOING;
+    if (!may_freeze() || !step_engine::freeze(frozen_ticks)) return Progress::GOING;
     frozen = true;
     starved = starving;
     return starving ? Progress::STARVED : Progress::AT_REST;
@@ -356,39 +354,39 @@ uint8_t rate_percent() {
     return static_cast<uint8_t>((100 * ONE) / stretch);
 }
 
-Progress serve(uint32_t now_ticks) {
+Progress serve() {
     if (!running) return Progress::GOING;
-    if (frozen) return serve_frozen(now_ticks);
-    prepare(now_ticks);
-    if (!step_engine::serve(now_ticks)) return Progress::MISSED;
+    if (frozen) return serve_frozen();
+    prepare();
+    if (!step_engine::serve()) return Progress::MISSED;
     bool ends_motion = false;
-    if (retire(now_ticks, ends_motion)) {
+    if (retire(ends_motion)) {
         clear();
         return ends_motion ? Progress::DONE : Progress::UNDERRUN;
     }
-    return freeze_if_due(now_ticks);
+    return freeze_if_due();
 }
 
-void halt(uint32_t now_ticks) {
+void halt() {
     bool ends_motion;
-    if (running && !frozen && !step_engine::missed()) retire(now_ticks, ends_motion);
+    if (running && !frozen && !step_engine::missed()) retire(ends_motion);
     step_engine::stop();
     clear();
 }
 
-Ledger ledger() {
+uint32_t tell_ledger(wire::Ledger& ledger) {
     const step_engine::Position position = step_engine::position();
-    Ledger ledger;
-    ledger.ticks = clock::extend(position.counter);
-    ledger.executed_segments = executed_segments;
+    const uint32_t ticks = clock::extend(position.counter);
+    uint32_t segments = executed_segments;
     // After a missed step, and while the path clock stands, time does not tell what was executed.
     const uint8_t timely = step_engine::missed() || frozen ? 0 : prepared_count;
-    for (uint8_t i = 0; i < timely && has_come(prepared[i].end_ticks, ledger.ticks); ++i) {
-        if (prepared[i].ends_segment) ++ledger.executed_segments;
+    for (uint8_t i = 0; i < timely && static_cast<int32_t>(prepared[i].end_ticks - ticks) <= 0; ++i) {
+        if (prepared[i].ends_segment) ++segments;
     }
+    ledger.executed_segments = segments;
     for (uint8_t joint = 0; joint < wire::JOINTS; ++joint)
         ledger.position_usteps[joint] = position.usteps[joint];
-    return ledger;
+    return ticks;
 }
 
 void set_position(uint8_t joint, int32_t usteps) {

@@ -28,12 +28,6 @@ enum class Progress : uint8_t {
 // What the path clock is to do.
 enum class Wish : uint8_t { GO, REST, REST_QUICKLY };
 
-struct Ledger {
-    uint32_t ticks;  // the moment it is told for
-    uint32_t executed_segments;
-    int32_t position_usteps[wire::JOINTS];
-};
-
 // What CONFIG and SOFT_LIMITS tell.
 struct Joint {
     uint32_t start_stop_ticks;
@@ -76,12 +70,13 @@ uint8_t override_percent();
 uint8_t rate_percent();
 
 // Moves the motion on; to be called often, at least every few hundred microseconds while it lasts.
-Progress serve(uint32_t now_ticks);
+Progress serve();
 
 // Stops all steps at once and drops the queue. The ledger stays true.
-void halt(uint32_t now_ticks);
+void halt();
 
-Ledger ledger();
+// Tells the ledger as it is at the moment returned, in ticks.
+uint32_t tell_ledger(wire::Ledger& ledger);
 // For an arm at rest.
 void set_position(uint8_t joint, int32_t usteps);
 

@@ -1,5 +1,6 @@
 #include "power.h"
 
+#include "clock.h"
 #include "hal_journal.h"
 #include "hal_pins.h"
 
@@ -21,8 +22,8 @@ uint32_t counted_ticks;
 
 }  // namespace
 
-void reset(uint32_t now_ticks) {
-    counted_ticks = now_ticks;
+void reset() {
+    counted_ticks = clock::pass_ticks();
     config = {0, 0, wire::DEFAULT_WAKE_TICKS};
     energised = waking = false;
     idle_for_ms = 0;
@@ -36,11 +37,11 @@ void configure(const Config& told) {
 
 bool has_option(Option option) { return (config.options & option) != 0; }
 
-void energise(uint32_t now_ticks) {
+void energise() {
     hal::journal_mark(true);
     hal::drivers_enable(true);
     energised = waking = true;
-    awake_ticks = now_ticks + (config.wake_ticks > MARK_TICKS ? config.wake_ticks : MARK_TICKS);
+    awake_ticks = clock::pass_ticks() + (config.wake_ticks > MARK_TICKS ? config.wake_ticks : MARK_TICKS);
 }
 
 void release() {
@@ -49,19 +50,19 @@ void release() {
     energised = waking = false;
 }
 
-uint32_t ready_ticks(uint32_t now_ticks) {
-    waking = waking && static_cast<int32_t>(awake_ticks - now_ticks) > 0;
-    return waking ? awake_ticks : now_ticks;
+uint32_t ready_ticks() {
+    waking = waking && !clock::has_come(awake_ticks);
+    return waking ? awake_ticks : clock::pass_ticks();
 }
 
-void note_activity(uint32_t now_ticks) {
+void note_activity() {
     idle_for_ms = 0;
-    counted_ticks = now_ticks;
+    counted_ticks = clock::pass_ticks();
 }
 
-bool is_idle_too_long(uint32_t now_ticks) {
-    ready_ticks(now_ticks);  // notices that they woke before the clock has gone round
-    if (now_ticks - counted_ticks >= TICKS_A_MS) {
+bool is_idle_too_long() {
+    ready_ticks();  // notices that they woke before the clock has gone round
+    if (clock::pass_ticks() - counted_ticks >= TICKS_A_MS) {
         counted_ticks += TICKS_A_MS;
         ++idle_for_ms;
     }

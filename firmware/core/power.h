@@ -24,23 +24,23 @@ enum Option : uint8_t {
 };
 
 // Drivers released, defaults. For start-up.
-void reset(uint32_t now_ticks);
+void reset();
 
 void configure(const Config& config);
 bool has_option(Option option);
 
 // Energises the drivers, and marks in EEPROM that the arm is held.
-void energise(uint32_t now_ticks);
+void energise();
 void release();
 
 // The earliest tick for a first step: the drivers are awake and the mark is written.
-uint32_t ready_ticks(uint32_t now_ticks);
+uint32_t ready_ticks();
 
 // Something happened that is not idleness.
-void note_activity(uint32_t now_ticks);
+void note_activity();
 // True when the drivers were idle for so long that they are to be released. To be called
 // every millisecond.
-bool is_idle_too_long(uint32_t now_ticks);
+bool is_idle_too_long();
 
 }  // namespace power
 }  // namespace planarm

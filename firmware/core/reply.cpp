@@ -14,110 +14,98 @@ namespace reply {
 
 namespace {
 
+constexpr uint8_t MAX_PAYLOAD = wire::WELCOME_BYTES;
+static_assert(wire::WELCOME_BYTES >= wire::STATUS_BYTES, "the longest reply");
+// Before the payload is read, and behind it; every byte but the delimiter may be stuffed.
+constexpr uint8_t MAX_HEAD = 2 * (wire::HEADER_BYTES + wire::CRC_BYTES);
+constexpr uint8_t MAX_TAIL = 2 * wire::CRC_BYTES + 1;
+
 Boot last_boot;
 
-// Collects a payload's fields, little-endian.
-class Fields {
-  public:
-    void u8(uint8_t byte) { *at_++ = byte; }
+// The frame as it is sent, from `line` on. It is stuffed from the payload in the same memory: writing two
+// bytes for each one that it reads, it has come as far as the payload's end when it has read it all.
+union {
+    uint8_t line[MAX_HEAD + 2 * MAX_PAYLOAD + MAX_TAIL];
+    struct {
+        uint8_t before[MAX_HEAD + MAX_PAYLOAD];
+        union {
+            wire::Welcome welcome;
+            wire::Status status;
+        };
+    } plain;
+} buffer;
 
-    void u16(uint16_t value) {
-        u8(static_cast<uint8_t>(value));
-        u8(static_cast<uint8_t>(value >> 8));
+uint8_t* end;  // of what is stuffed
+uint16_t crc;
+
+void stuff(uint8_t byte) {
+    crc = hal::crc_update(crc, byte);
+    if (is_special(byte)) {
+        *end++ = wire::ESCAPE;
+        byte ^= wire::ESCAPE_XOR;
     }
-
-    void u32(uint32_t value) {
-        u16(static_cast<uint16_t>(value));
-        u16(static_cast<uint16_t>(value >> 16));
-    }
-
-    void ledger(const motion::Ledger& ledger) {
-        u32(ledger.executed_segments);
-        for (int32_t usteps : ledger.position_usteps) u32(static_cast<uint32_t>(usteps));
-    }
-
-    const uint8_t* bytes() const { return bytes_; }
-    uint8_t size() const { return static_cast<uint8_t>(at_ - bytes_); }
-
-  private:
-    uint8_t bytes_[MAX_PAYLOAD];
-    uint8_t* at_ = bytes_;
-};
-
-// Stuffs bytes and carries their checksum on; returns where the next byte goes.
-uint8_t* stuff(uint8_t* at, const uint8_t* bytes, uint8_t size, uint16_t& checksum) {
-    uint16_t crc = checksum;
-    for (; size != 0; --size) {
-        uint8_t byte = *bytes++;
-        crc = hal::crc_update(crc, byte);
-        if (is_special(byte)) {
-            *at++ = wire::ESCAPE;
-            byte ^= wire::ESCAPE_XOR;
-        }
-        *at++ = byte;
-    }
-    checksum = crc;
-    return at;
+    *end++ = byte;
 }
 
-// Stuffs a checksum. The payload's starts from the header's, so `checksum` itself stays as it is.
-uint8_t* stuff_checksum(uint8_t* at, uint16_t checksum) {
-    const uint8_t bytes[] = {static_cast<uint8_t>(checksum), static_cast<uint8_t>(checksum >> 8)};
-    return stuff(at, bytes, wire::CRC_BYTES, checksum);
+// The payload's checksum goes on from the header's, so it stays as it is.
+void stuff_checksum() {
+    const uint16_t told = crc;
+    stuff(static_cast<uint8_t>(told));
+    stuff(static_cast<uint8_t>(told >> 8));
+    crc = told;
 }
 
-uint8_t encode(uint8_t* encoded, uint8_t seq, wire::MessageType type, const Fields& payload) {
-    const uint8_t header[wire::HEADER_BYTES] = {payload.size(), seq, static_cast<uint8_t>(type)};
-    uint16_t checksum = wire::CRC_INITIAL;
-    uint8_t* at = stuff(encoded, header, wire::HEADER_BYTES, checksum);
-    at = stuff_checksum(at, checksum);
-    at = stuff(at, payload.bytes(), payload.size(), checksum);
-    at = stuff_checksum(at, checksum);
-    *at++ = wire::DELIMITER;
-    return static_cast<uint8_t>(at - encoded);
+void send(uint8_t seq, wire::MessageType type, uint8_t size) {
+    const uint8_t* payload = reinterpret_cast<const uint8_t*>(&buffer.plain.status);
+    end = buffer.line;
+    crc = wire::CRC_INITIAL;
+    stuff(size);
+    stuff(seq);
+    stuff(static_cast<uint8_t>(type));
+    stuff_checksum();
+    for (; size != 0; --size) stuff(*payload++);
+    stuff_checksum();
+    *end++ = wire::DELIMITER;
+    hal::serial_send(buffer.line, static_cast<uint8_t>(end - buffer.line));
 }
 
 }  // namespace
 
 void set_boot(const Boot& boot) { last_boot = boot; }
 
-uint8_t welcome(uint8_t* encoded, const session::Report& report, uint32_t host_nonce) {
-    static_assert(wire::WELCOME_BYTES == MAX_PAYLOAD && wire::WELCOME_BYTES >= wire::STATUS_BYTES,
-                  "the buffer's size");
-    Fields fields;
-    fields.u8(wire::PROTOCOL_VERSION);
-    fields.u32(host_nonce);
-    fields.u32(last_boot.nonce);
-    fields.u32(wire::SPEC_HASH);
-    fields.u8(VERSION_MAJOR);
-    fields.u8(VERSION_MINOR);
-    fields.u8(VERSION_PATCH);
-    fields.u8(static_cast<uint8_t>(last_boot.cause));
-    fields.u8(last_boot.interrupted ? 1 : 0);
-    fields.u8(wire::JOINTS);
-    fields.ledger(motion::ledger());
-    return encode(encoded, report.expected_seq, wire::MessageType::WELCOME, fields);
+void send_welcome(const session::Report& report, uint32_t host_nonce) {
+    wire::Welcome& told = buffer.plain.welcome;
+    told.protocol_version = wire::PROTOCOL_VERSION;
+    told.host_nonce = host_nonce;
+    told.boot_nonce = last_boot.nonce;
+    told.spec_hash = wire::SPEC_HASH;
+    told.firmware_version[0] = VERSION_MAJOR;
+    told.firmware_version[1] = VERSION_MINOR;
+    told.firmware_version[2] = VERSION_PATCH;
+    told.reset_cause = last_boot.cause;
+    told.interrupted = last_boot.interrupted ? 1 : 0;
+    told.joints = wire::JOINTS;
+    motion::tell_ledger(told.ledger);
+    send(report.expected_seq, wire::MessageType::WELCOME, sizeof(told));
 }
 
-uint8_t status(uint8_t* encoded, const session::Report& report) {
-    const motion::Ledger ledger = motion::ledger();
-    Fields fields;
-    fields.u8(static_cast<uint8_t>(supervisor::state()));
-    fields.u8(static_cast<uint8_t>(supervisor::fault()));
-    fields.u8(supervisor::fault_detail());
-    fields.u8(static_cast<uint8_t>(report.refusal));
-    fields.u8(report.refusal_seq);
-    fields.u16(motion::free_bytes());
-    fields.u8(report.crc_errors);
-    fields.u8(hal::serial_overruns());
-    fields.u8(hal::serial_ring_full());
-    fields.u8(hal::hold_count());
-    fields.u8(inputs::report());
-    fields.u8(motion::override_percent());
-    fields.u8(motion::rate_percent());
-    fields.u32(ledger.ticks);
-    fields.ledger(ledger);
-    return encode(encoded, report.expected_seq, wire::MessageType::STATUS, fields);
+void send_status(const session::Report& report) {
+    wire::Status& told = buffer.plain.status;
+    told.mcu_ticks = motion::tell_ledger(told.ledger);
+    told.state = supervisor::state();
+    told.fault = supervisor::fault();
+    told.detail = supervisor::fault_detail();
+    told.refusal = report.refusal;
+    told.refusal_seq = report.refusal_seq;
+    told.free_bytes = motion::free_bytes();
+    told.crc_errors = report.crc_errors;
+    told.overruns = hal::serial_overruns();
+    told.ring_full = hal::serial_ring_full();
+    told.holds = hal::hold_count();
+    told.inputs = inputs::report();
+    told.override_percent = motion::override_percent();
+    told.rate_percent = motion::rate_percent();
+    send(report.expected_seq, wire::MessageType::STATUS, sizeof(told));
 }
 
 }  // namespace reply

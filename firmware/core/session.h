@@ -8,9 +8,9 @@
 namespace planarm {
 namespace session {
 
-// What STATUS tells of the session.
+// What replies tell of the session.
 struct Report {
-    uint8_t expected_seq;  // the next frame's, told in every reply
+    uint8_t expected_seq;  // the next frame's
     wire::Result refusal;
     uint8_t refusal_seq;
     uint8_t crc_errors;
@@ -20,22 +20,21 @@ struct Report {
 void reset();
 
 // A frame that passed its checks. Its payload must stay in place until `is_busy` is false.
-void on_frame(const Frame& frame, uint32_t now_ticks);
+void on_frame(const Frame& frame);
 // A frame that failed its checks.
 void on_damage();
 
 // True while a frame is being carried out piece by piece.
 bool is_busy();
 // Carries out the next piece, one segment.
-void advance(uint32_t now_ticks);
+void advance();
 
 // Asks for a STATUS that no frame asked for.
 void announce();
 
-Report report();
-
-// Builds the reply that is due and returns its encoded size; 0 when none is due. It tells this very moment.
-uint8_t take_reply(uint8_t* encoded);
+// Sends the reply that is due, which tells this very moment; hal::serial_can_send must hold. True when there
+// was one.
+bool send_reply();
 
 }  // namespace session
 }  // namespace planarm

@@ -82,11 +82,11 @@ bool start(const Run& run) {
 }
 
 template <uint8_t JOINT>
-bool start_when_due(uint32_t now_ticks) {
+bool start_when_due() {
     if (hal::step_interrupt_is_on<JOINT>()) return true;
     const Run* const run = step_joints[JOINT].active;  // the interrupt is off: nobody else writes it
     if (run == rings[JOINT].free) return true;
-    const int32_t away_ticks = static_cast<int32_t>(run->first_ticks - now_ticks);
+    const int32_t away_ticks = clock::ticks_until(run->first_ticks);
     if (away_ticks > START_AHEAD_TICKS) return true;
     return away_ticks > 0 && start<JOINT>(*run);
 }
@@ -196,10 +196,10 @@ void append(uint8_t joint, const Piece& piece) {
     ring.free = run.next;
 }
 
-bool serve(uint32_t now_ticks) {
+bool serve() {
     if (missed()) return false;
     bool in_time = true;
-    for_each_joint([&](auto joint) { in_time = in_time && start_when_due<joint.NUMBER>(now_ticks); });
+    for_each_joint([&](auto joint) { in_time = in_time && start_when_due<joint.NUMBER>(); });
     if (!in_time) {
         const hal::InterruptLock lock;
         if (step_missed == 0) step_missed = STEP_MISSED_AT_START | hal::step_interrupts_on();

@@ -82,7 +82,7 @@ void append(uint8_t joint, const Piece& piece);
 void set_dir_inverted(uint8_t joint, bool inverted);
 
 // Starts idle joints whose next run is due soon. False when a step came too late.
-bool serve(uint32_t now_ticks);
+bool serve();
 
 // True from a missed step to the stop that follows.
 inline bool missed() { return step_missed != 0; }

@@ -102,20 +102,20 @@ bool find(Event event, Row& row) {
     return false;
 }
 
-void carry_out(Outcome outcome, uint32_t now_ticks) {
+void carry_out(Outcome outcome) {
     switch (outcome) {
         case Outcome::NONE:
             return;
         case Outcome::ENERGISE:
-            return power::energise(now_ticks);
+            return power::energise();
         case Outcome::RELEASE:
-            motion::halt(now_ticks);
+            motion::halt();
             latched_fault = Fault::NONE;
             latched_detail = 0;
             return power::release();
         case Outcome::DROP:
             home::cancel();
-            return motion::halt(now_ticks);
+            return motion::halt();
         case Outcome::GO:
             return motion::set_wish(motion::Wish::GO);
         case Outcome::REST:
@@ -144,17 +144,17 @@ bool allows(Event event) {
     return find(event, row);
 }
 
-void apply(Event event, uint32_t now_ticks) {
+void apply(Event event) {
     Row row;
     if (!find(event, row)) return;
     current_state = row.to;
-    power::note_activity(now_ticks);
-    carry_out(row.outcome, now_ticks);
+    power::note_activity();
+    carry_out(row.outcome);
 }
 
-void fail(Fault fault, uint8_t detail, uint32_t now_ticks) {
+void fail(Fault fault, uint8_t detail) {
     home::cancel();
-    motion::halt(now_ticks);
+    motion::halt();
     latched_fault = fault;
     latched_detail = detail;
     current_state = State::FAULT;

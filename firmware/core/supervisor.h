@@ -52,10 +52,10 @@ uint8_t fault_detail();
 bool allows(Event event);
 
 // Carries out the event's row. An event without one changes nothing.
-void apply(Event event, uint32_t now_ticks);
+void apply(Event event);
 
 // Stops the steps and latches the fault. In the fault state nothing happens that could bring another.
-void fail(wire::Fault fault, uint8_t detail, uint32_t now_ticks);
+void fail(wire::Fault fault, uint8_t detail = 0);
 
 }  // namespace supervisor
 }  // namespace planarm

@@ -94,7 +94,7 @@ def test_the_page_tells_every_message_field_limit_and_code() -> None:
 
 def header_program() -> str:
     """A program of static_asserts: every number of the header against the specification, layouts counted by codec."""
-    lines = ['#include "messages.h"', "using namespace planarm::wire;"]
+    lines = ["#include <stddef.h>", '#include "messages.h"', "using namespace planarm::wire;"]
 
     def check(expression: str, value: int) -> None:
         lines.append(f'static_assert({expression} == {value}, "{expression}");')
@@ -126,19 +126,19 @@ def header_program() -> str:
     # Where a field starts, found by changing it alone and looking which payload byte changes first.
     zero = decode(0x82, bytes(30))
     changes = {
-        "STATE": {"state": messages.State.READY},
-        "FAULT": {"fault": messages.Fault.UNDERRUN},
-        "REFUSAL": {"refusal": messages.Result.VERSION},
-        "FREE_BYTES": {"free_bytes": 1},
-        "RING_FULL": {"ring_full": 1},
-        "MCU_TICKS": {"mcu_ticks": 1},
-        "LEDGER_EXECUTED_SEGMENTS": {"ledger": messages.Ledger(1, (0, 0))},
-        "LEDGER_POSITION_USTEPS": {"ledger": messages.Ledger(0, (1, 0))},
+        "state": {"state": messages.State.READY},
+        "fault": {"fault": messages.Fault.UNDERRUN},
+        "refusal": {"refusal": messages.Result.VERSION},
+        "free_bytes": {"free_bytes": 1},
+        "ring_full": {"ring_full": 1},
+        "mcu_ticks": {"mcu_ticks": 1},
+        "ledger.executed_segments": {"ledger": messages.Ledger(1, (0, 0))},
+        "ledger.position_usteps": {"ledger": messages.Ledger(0, (1, 0))},
     }
     for name, change in changes.items():
         _, payload = encode(messages.Status(**{f: getattr(zero, f) for f in zero.__slots__} | change))
-        check(f"status_at::{name}", next(at for at, byte in enumerate(payload) if byte))
-    check("STATUS_BYTES", 30)
+        check(f"offsetof(Status, {name})", next(at for at, byte in enumerate(payload) if byte))
+    check("sizeof(Status)", 30)
     check("WELCOME_BYTES", len(encode(decode(0x81, bytes(31)))[1]))
     return "\n".join((*lines, "int main() { return 0; }"))
 

@@ -293,15 +293,13 @@ uint8_t planarm_signal(uint8_t event) {
     namespace supervisor = planarm::supervisor;
     const supervisor::Event told = static_cast<supervisor::Event>(event);
     const bool allowed = supervisor::allows(told);
-    supervisor::apply(told, static_cast<uint32_t>(uno.now));
+    supervisor::apply(told);
     return allowed ? 1 : 0;
 }
 
 uint8_t planarm_state() { return static_cast<uint8_t>(planarm::supervisor::state()); }
 
-void planarm_latch(uint8_t fault) {
-    planarm::supervisor::fail(static_cast<planarm::wire::Fault>(fault), 0, static_cast<uint32_t>(uno.now));
-}
+void planarm_latch(uint8_t fault) { planarm::supervisor::fail(static_cast<planarm::wire::Fault>(fault)); }
 
 uint64_t planarm_now() { return uno.now; }
 

@@ -1,6 +1,6 @@
-"""Writes messages.h: the wire's numbers for the firmware, in C++14 that avr-gcc 5.4 takes.
+"""Writes messages.h: the wire's numbers and layouts for the firmware, in C++14 that avr-gcc 5.4 takes.
 
-Only constants and enumerations: nothing in it takes flash or RAM until it is used.
+Only constants and types: nothing in it takes flash or RAM until it is used.
 """
 
 from __future__ import annotations
@@ -45,6 +45,11 @@ _WIRING_TAIL = """
 }  // namespace planarm
 """
 
+_LAYOUT_HEAD = """
+// Payloads of a fixed layout, byte by byte as they are on the wire.
+static_assert(__BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__, "the wire's numbers are little-endian, as here");
+"""
+
 BOARD_LIMITS = ("joints", "queue_bytes", "min_interval_ticks")
 
 _TAIL = """
@@ -70,7 +75,11 @@ def messages_h(spec: Spec) -> str:
     )
     for section, base, doc, entries in sections:
         lines.extend(_enum(ENUMS[section], base, doc, ((e.name, e.code, e.text) for e in entries)))
+    lines.append(_LAYOUT_HEAD.rstrip("\n"))
     structs = {struct.name: struct for struct in spec.structs}
+    for struct in spec.structs:
+        if struct.min_bytes == struct.max_bytes:
+            lines.extend(_struct(struct, structs))
     for message in spec.messages:
         lines.extend(_layout(message, structs))
     return "\n".join(lines) + "\n" + _TAIL
@@ -162,21 +171,40 @@ def _enum(name: str, base: str, doc: str, members: Iterable[tuple[str, int, str]
 
 
 def _layout(message: MessageSpec, structs: Mapping[str, StructSpec]) -> Iterator[str]:
-    """Yield the payload's size and, when the layout is fixed, where each field starts."""
-    name = message.name.upper()
+    """Yield the payload as a struct; when its layout is not fixed, its least size only."""
+    if message.min_bytes == message.max_bytes:
+        yield from _struct(message, structs)
+        return
     yield f"\n// {class_name(message.name)}: payload of {byte_range(message.min_bytes, message.max_bytes)}."
-    if message.min_bytes != message.max_bytes:
-        yield f"constexpr uint8_t {name}_MIN_BYTES = {_size_of(message, structs, least=True)};"
+    yield f"constexpr uint8_t {message.name.upper()}_MIN_BYTES = {_size_of(message, structs, least=True)};"
+
+
+def _struct(item: MessageSpec | StructSpec, structs: Mapping[str, StructSpec]) -> Iterator[str]:
+    """Yield a struct that lies in memory as on the wire, and the bytes it takes there."""
+    name = class_name(item.name)
+    size = _size_of(item, structs)
+    told = byte_range(item.min_bytes, item.max_bytes)
+    yield f"\n// {name}: {told}{' with two joints' if size.a_joint else ''}."
+    yield f"constexpr uint8_t {item.name.upper()}_BYTES = {size};"
+    if not item.fields:
         return
-    yield f"constexpr uint8_t {name}_BYTES = {_size_of(message, structs)};"
-    if not message.fields:
-        return
-    yield f"namespace {message.name}_at {{"
-    rows = [(f"constexpr uint8_t {f.upper()} = {at};", kind) for f, kind, at in _offsets(message, structs, "", Bytes())]
-    width = max(len(row) for row, _ in rows)
-    for row, kind in rows:
-        yield f"{row:{width}}  // {kind}"
-    yield f"}}  // namespace {message.name}_at"
+    yield f"struct [[gnu::packed, gnu::may_alias]] {name} {{"
+    for field in item.fields:
+        yield f"    {_c_type(field)} {field.name}{_c_count(field)};"
+    yield "};"
+    yield f'static_assert(sizeof({name}) == {item.name.upper()}_BYTES, "as on the wire");'
+
+
+def _c_type(field: FieldSpec) -> str:
+    if field.enum is not None:
+        return ENUMS[field.enum]
+    return SCALARS[field.kind].c_type if field.kind in SCALARS else class_name(field.kind)
+
+
+def _c_count(field: FieldSpec) -> str:
+    if field.count is None:
+        return ""
+    return "[JOINTS]" if field.count == EACH_JOINT else f"[{field.count}]"
 
 
 @dataclass(frozen=True, slots=True)
@@ -216,17 +244,3 @@ def _size_of(item: MessageSpec | StructSpec, structs: Mapping[str, StructSpec], 
     for field in item.fields:
         total += _field_size(field, structs, least)
     return total
-
-
-def _offsets(
-    item: MessageSpec | StructSpec, structs: Mapping[str, StructSpec], prefix: str, offset: Bytes
-) -> Iterator[tuple[str, str, Bytes]]:
-    for field in item.fields:
-        name = f"{prefix}{field.name}"
-        if field.kind in SCALARS:
-            times = "JOINTS" if field.count == EACH_JOINT else field.count
-            kind = f"{field.kind} x {times}" if field.count else field.kind
-            yield name, f"{kind}{'' if field.unit == '1' else ', ' + field.unit}", offset
-        else:
-            yield from _offsets(structs[field.kind], structs, f"{name}_", offset)
-        offset += _field_size(field, structs, least=False)
