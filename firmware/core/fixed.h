@@ -7,19 +7,10 @@
 
 namespace planarm {
 
+using hal::add_to;
 using hal::Fixed48;
 using hal::multiply;
-
-inline void add_to(Fixed48& sum, Fixed48 term) {
-    const uint16_t low = static_cast<uint16_t>(sum.low + term.low);
-    sum.high += term.high + (low < term.low ? 1 : 0);
-    sum.low = low;
-}
-
-inline void subtract_from(Fixed48& sum, Fixed48 term) {
-    sum.high -= term.high + (sum.low < term.low ? 1 : 0);
-    sum.low = static_cast<uint16_t>(sum.low - term.low);
-}
+using hal::subtract_from;
 
 // a b / 2^16 and a b / 2^32, rounded down; 2^32 - 1 when it does not fit.
 uint32_t multiply_q16(uint32_t a, uint32_t b);

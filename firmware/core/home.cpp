@@ -1,6 +1,7 @@
 #include "home.h"
 
 #include "clock.h"
+#include "hal_base.h"
 #include "inputs.h"
 #include "segment.h"
 #include "step_engine.h"
@@ -18,45 +19,49 @@ constexpr uint32_t NEAR_TICKS = 32000;
 // Between two phases the joint stands still.
 constexpr uint32_t PAUSE_TICKS = 1600000;
 
-wire::Home order;
-Phase phase = Phase::NONE;
-uint32_t steps_left;
-uint32_t next_ticks;  // of the next step
-bool first_step;
+struct Homing {
+    wire::Home order;
+    Phase phase;
+    uint32_t interval_ticks;
+    uint32_t steps_left;
+    uint32_t next_ticks;  // of the next step
+    bool first_step;
+};
 
-void enter(Phase next, uint32_t steps, uint32_t start_ticks) {
-    phase = next;
-    steps_left = steps;
-    next_ticks = start_ticks;
-    first_step = true;
+Homing homing;
+
+void enter(Homing& at, Phase phase, uint32_t start_ticks) {
+    const bool approach = phase == Phase::APPROACH;
+    at.phase = phase;
+    at.interval_ticks = approach ? at.order.fast_ticks : at.order.slow_ticks;
+    at.steps_left = approach ? at.order.most_usteps : at.order.back_usteps;
+    at.next_ticks = start_ticks;
+    at.first_step = true;
 }
 
-uint32_t interval_ticks() { return phase == Phase::APPROACH ? order.fast_ticks : order.slow_ticks; }
-
 // False when all steps of the phase were made.
-bool feed() {
-    const int32_t ahead_ticks = clock::ticks_until(next_ticks);
+bool feed(Homing& at) {
+    const int32_t ahead_ticks = clock::ticks_until(at.next_ticks);
     if (ahead_ticks > AHEAD_TICKS) return true;
-    if (steps_left == 0) return ahead_ticks > 0;
-    if (!step_engine::has_room(order.joint)) return true;
-    const uint32_t interval = interval_ticks();
+    if (at.steps_left == 0) return ahead_ticks > 0;
+    if (!step_engine::has_room(at.order.joint)) return true;
     step_engine::Piece piece;
-    piece.first_ticks = next_ticks;
+    piece.first_ticks = at.next_ticks;
     piece.interval_q16 = piece.add_q16 = 0;
     piece.fraction = 0;
     piece.steps = 1;
-    piece.positive = (order.positive == 1) != (phase == Phase::BACK);
-    piece.near = !first_step && interval <= NEAR_TICKS;
-    step_engine::append(order.joint, piece);
-    first_step = false;
-    next_ticks += interval;
-    --steps_left;
+    piece.positive = (at.order.positive == 1) != (at.phase == Phase::BACK);
+    piece.near = !at.first_step && at.interval_ticks <= NEAR_TICKS;
+    step_engine::append(at.order.joint, piece);
+    at.first_step = false;
+    at.next_ticks += at.interval_ticks;
+    --at.steps_left;
     return true;
 }
 
 }  // namespace
 
-void reset() { phase = Phase::NONE; }
+void reset() { homing.phase = Phase::NONE; }
 
 bool is_good(const wire::Home& told) {
     const bool slow_enough = told.fast_ticks >= MIN_REVERSAL_TICKS && told.slow_ticks >= told.fast_ticks &&
@@ -67,38 +72,31 @@ bool is_good(const wire::Home& told) {
 }
 
 void begin(const wire::Home& told, uint32_t start_ticks) {
-    order = told;
-    if (inputs::is_hit(order.joint)) {
-        enter(Phase::BACK, order.back_usteps, start_ticks);
-    } else {
-        enter(Phase::APPROACH, order.most_usteps, start_ticks);
-    }
+    Homing& at = hal::by_base(homing);
+    at.order = told;
+    enter(at, inputs::is_hit(told.joint) ? Phase::BACK : Phase::APPROACH, start_ticks);
 }
 
-void cancel() { phase = Phase::NONE; }
+void cancel() { homing.phase = Phase::NONE; }
 
-bool is_active() { return phase != Phase::NONE; }
+bool is_active() { return homing.phase != Phase::NONE; }
 
-uint8_t joint() { return order.joint; }
+uint8_t joint() { return homing.order.joint; }
 
 Progress serve() {
-    if (phase == Phase::NONE) return Progress::NONE;
+    Homing& at = hal::by_base(homing);
+    if (at.phase == Phase::NONE) return Progress::NONE;
     if (!step_engine::serve()) return Progress::MISSED;
-    const bool hit = inputs::is_hit(order.joint);
-    const bool there = phase == Phase::BACK ? !hit : hit;
-    if (!there) return feed() ? Progress::GOING : Progress::FAILED;
+    const bool hit = inputs::is_hit(at.order.joint);
+    const bool there = at.phase == Phase::BACK ? !hit : hit;
+    if (!there) return feed(at) ? Progress::GOING : Progress::FAILED;
     step_engine::stop();
-    switch (phase) {
-        case Phase::APPROACH:
-            enter(Phase::BACK, order.back_usteps, clock::pass_ticks() + PAUSE_TICKS);
-            return Progress::GOING;
-        case Phase::BACK:
-            enter(Phase::TOUCH, order.back_usteps, clock::pass_ticks() + PAUSE_TICKS);
-            return Progress::GOING;
-        default:
-            phase = Phase::NONE;
-            return Progress::DONE;
+    if (at.phase == Phase::TOUCH) {
+        at.phase = Phase::NONE;
+        return Progress::DONE;
     }
+    enter(at, at.phase == Phase::APPROACH ? Phase::BACK : Phase::TOUCH, clock::pass_ticks() + PAUSE_TICKS);
+    return Progress::GOING;
 }
 
 }  // namespace home

@@ -37,16 +37,19 @@ constexpr uint8_t MAX_SLICES = 4;
 // -- what is queued --
 
 uint32_t queued_path_ticks;  // of all segments not yet begun, saturated
-bool complete;               // the motion's last segment is among those
-Rest queue_rest;             // at the end of the queue
-int32_t queue_usteps[wire::JOINTS];
+// What the segments after the last queued one go on from.
+struct QueueEnd {
+    Rest rests[wire::JOINTS];
+    int32_t usteps[wire::JOINTS];
+    bool complete;  // the motion's last segment is queued
+};
+
+QueueEnd queue_end;
 
 struct Check {
     Reader reader;
     uint32_t path_ticks;
-    Rest rest;
-    int32_t usteps[wire::JOINTS];
-    bool complete;
+    QueueEnd end;
     uint8_t joint_out;
 };
 
@@ -99,7 +102,7 @@ uint32_t frozen_ticks;
 
 // True when the path that is left after `path_ticks` of the segment is too short to rest on.
 bool is_starving(uint32_t path_ticks, uint32_t margin_ticks) {
-    if (complete || segment_last || queue::free_bytes() < FULL_BYTES) return false;
+    if (queue_end.complete || segment_last || queue::free_bytes() < FULL_BYTES) return false;
     const uint32_t rest_of_segment = in_segment ? segment_ticks - path_ticks : 0;
     return add_saturated(queued_path_ticks, rest_of_segment) < need_ticks + margin_ticks;
 }
@@ -135,15 +138,15 @@ bool is_starving(uint32_t path_ticks, uint32_t margin_ticks) {
 
 // The stretch at the end of the next slice.
 uint32_t next_stretch(uint32_t path_ticks) {
-    using path_clock::MAX_STRETCH;
-    const bool starving = is_starving(path_at + path_ticks, STARVING_MARGIN_TICKS);
-    if (wish == Wish::REST_QUICKLY || starving) {
-        return path_clock::slowed({stretch, MAX_STRETCH, slow_value, path_ticks});
-    }
-    const uint32_t target = wish == Wish::REST ? MAX_STRETCH : override_stretch;
-    if (target > stretch) return path_clock::slowed({stretch, target, slow_value >> 1, path_ticks});
-    if (target < stretch) return path_clock::sped_up({stretch, target, fast_value >> 1, path_ticks});
-    return stretch;
+    const bool quickly =
+        wish == Wish::REST_QUICKLY || is_starving(path_at + path_ticks, STARVING_MARGIN_TICKS);
+    path_clock::Change change;
+    change.stretch = stretch;
+    change.target = quickly || wish == Wish::REST ? path_clock::MAX_STRETCH : override_stretch;
+    change.rate = change.target > stretch ? slow_value : fast_value;
+    if (!quickly) change.rate >>= 1;
+    change.path_ticks = path_ticks;
+    return path_clock::stretch_after(change);
 }
 
 bool is_calm() {
@@ -154,16 +157,22 @@ bool is_calm() {
 }
 
 [[gnu::noinline]] void open_slice() {
-    uint32_t path_ticks = segment_ticks - path_at;
-    if (path_ticks > slice_ticks) path_ticks = slice_ticks;
-    const uint32_t end_stretch = next_stretch(path_ticks);
-    slice = Slice(
-        {path_at, path_ticks, prepare_ticks, stretch, end_stretch, path_at + path_ticks == segment_ticks});
-    stretch = end_stretch;
-    path_at += path_ticks;
+    path_clock::Stretch path;
+    path.from_path = path_at;
+    path.path_ticks = segment_ticks - path_at;
+    path.ends_segment = path.path_ticks <= slice_ticks;
+    if (!path.ends_segment) path.path_ticks = slice_ticks;
+    path.start_ticks = prepare_ticks;
+    path.s0 = stretch;
+    path.s1 = stretch = next_stretch(path.path_ticks);
+    slice.begin(path);
+    path_at = slice.end_path();
     prepare_ticks += slice.ticks();
-    const bool ends_segment = path_at == segment_ticks;
-    prepared[prepared_count++] = {prepare_ticks, ends_segment, ends_segment && segment_last, is_calm()};
+    Prepared& entry = prepared[prepared_count++];
+    entry.end_ticks = prepare_ticks;
+    entry.ends_segment = path.ends_segment;
+    entry.ends_motion = path.ends_segment && segment_last;
+    entry.calm = is_calm();
     filling = true;
 }
 
@@ -218,15 +227,15 @@ bool retire(bool& ends_motion) {
 void clear() {
     queue::clear();
     queued_path_ticks = 0;
-    complete = false;
-    queue_rest = Rest();
+    queue_end.complete = false;
+    for (Rest& rest : queue_end.rests) rest = Rest();
     running = reading = in_segment = segment_last = filling = frozen = starved = false;
     wish = Wish::GO;
     stretch = override_stretch;
     prepared_count = 0;
     for (Cursor& cursor : cursors) cursor.reset();
     const step_engine::Position position = step_engine::position();
-    for (uint8_t joint = 0; joint < wire::JOINTS; ++joint) queue_usteps[joint] = position.usteps[joint];
+    for (uint8_t joint = 0; joint < wire::JOINTS; ++joint) queue_end.usteps[joint] = position.usteps[joint];
 }
 
 void thaw() {
@@ -277,38 +286,35 @@ void reset() {
     clear();
 }
 
-bool is_complete() { return complete; }
+bool is_complete() { return queue_end.complete; }
 
 wire::Result begin_check(const uint8_t* bytes, uint8_t length) {
     if (length > queue::free_bytes()) return wire::Result::BUSY;
     checked.reader = Reader(bytes, length);
     for (uint8_t i = 0; i < 3; ++i) checked.reader.u8();
     checked.path_ticks = 0;
-    checked.rest = queue_rest;
-    checked.complete = false;
+    checked.end = queue_end;
     checked.joint_out = wire::JOINTS;
-    for (uint8_t joint = 0; joint < wire::JOINTS; ++joint) checked.usteps[joint] = queue_usteps[joint];
     return checked.reader.ok() && !checked.reader.at_end() ? wire::Result::OK : wire::Result::MALFORMED;
 }
 
 wire::Result check_next() {
-    if (checked.complete) return wire::Result::WRONG_STATE;
+    if (checked.end.complete) return wire::Result::WRONG_STATE;
     Segment segment;
     read_segment(checked.reader, segment);
     if (!checked.reader.ok()) return wire::Result::MALFORMED;
-    const wire::Result result = check_segment(segment, checked.rest);
-    if (result != wire::Result::OK) return result;
+    if (!check_segment(segment, checked.end.rests)) return wire::Result::OUT_OF_RANGE;
     checked.path_ticks = add_saturated(checked.path_ticks, segment.duration_ticks);
-    checked.complete = segment.last;
+    checked.end.complete = segment.last;
     for (uint8_t joint = 0; joint < wire::JOINTS; ++joint) {
         const Move& move = segment.moves[joint];
-        int32_t& usteps = checked.usteps[joint];
+        int32_t& usteps = checked.end.usteps[joint];
         usteps += move.positive ? static_cast<int32_t>(move.steps) : -static_cast<int32_t>(move.steps);
         const Joint& limits = joints[joint];
         if (move.steps == 0 || limits.least_usteps > limits.most_usteps) continue;
         if (usteps < limits.least_usteps || usteps > limits.most_usteps) checked.joint_out = joint;
     }
-    return result;
+    return wire::Result::OK;
 }
 
 bool is_checked() { return checked.reader.at_end(); }
@@ -321,9 +327,7 @@ bool commit(const uint8_t* bytes, uint8_t length) {
         return false;
     queue::append(bytes, length);
     queued_path_ticks = add_saturated(queued_path_ticks, checked.path_ticks);
-    queue_rest = checked.rest;
-    complete = checked.complete;
-    for (uint8_t joint = 0; joint < wire::JOINTS; ++joint) queue_usteps[joint] = checked.usteps[joint];
+    queue_end = checked.end;
     return true;
 }
 
@@ -391,7 +395,7 @@ uint32_t tell_ledger(wire::Ledger& ledger) {
 
 void set_position(uint8_t joint, int32_t usteps) {
     step_engine::set_position(joint, usteps);
-    queue_usteps[joint] = usteps;
+    queue_end.usteps[joint] = usteps;
 }
 
 }  // namespace motion

@@ -13,23 +13,12 @@ uint32_t relative_change(const Change& change, uint32_t stretch) {
     return multiply_q32(multiply_saturated(change.rate, change.path_ticks), multiply_q16(stretch, stretch));
 }
 
-}  // namespace
-
-uint32_t rate_value(uint8_t code) {
-    const uint8_t mantissa = static_cast<uint8_t>(code & 0x0F);
-    const uint8_t exponent = static_cast<uint8_t>(code >> 4);
-    if (exponent == 0) return mantissa;
-    uint32_t value = 16u + mantissa;
-    for (uint8_t i = 1; i < exponent; ++i) value <<= 1;
-    return value;
-}
-
 // At most twice the stretch, so that a quadratic in the number of steps stays a good likeness.
 uint32_t slowed(const Change& change) {
+    uint32_t growth = change.stretch;
     const uint32_t relative = relative_change(change, change.stretch);
-    uint32_t end =
-        change.stretch + (relative >= ONE ? change.stretch : multiply_q16(change.stretch, relative));
-    if (end > MAX_STRETCH) end = MAX_STRETCH;
+    if (relative < ONE) growth = multiply_q16(growth, relative);
+    const uint32_t end = change.stretch + growth;
     return end < change.target ? end : change.target;
 }
 
@@ -52,31 +41,45 @@ uint32_t sped_up(const Change& change) {
     return end > change.target ? end : change.target;
 }
 
-Slice::Slice(const Ends& ends) : ends_(ends), ticks_(ends.path_ticks) {
-    if (is_plain()) return;
-    const uint32_t mean =
-        ends.s0 < ends.s1 ? ends.s0 + ((ends.s1 - ends.s0) >> 1) : ends.s1 + ((ends.s0 - ends.s1) >> 1);
-    ticks_ = multiply_q16(ends.path_ticks, mean);
-    if (ends.s0 != ends.s1) reciprocal_ = 0xFFFFFFFF / ends.path_ticks;
+}  // namespace
+
+uint32_t rate_value(uint8_t code) {
+    const uint8_t mantissa = static_cast<uint8_t>(code & 0x0F);
+    const uint8_t exponent = static_cast<uint8_t>(code >> 4);
+    if (exponent == 0) return mantissa;
+    uint32_t value = 16u + mantissa;
+    for (uint8_t i = 1; i < exponent; ++i) value <<= 1;
+    return value;
 }
 
-uint32_t Slice::change_at(uint16_t path) const {
-    if (ends_.s0 == ends_.s1) return 0;
-    const Fixed48 share = multiply(reciprocal_, path);  // of the slice, in 2^-32
-    const uint32_t whole = ends_.s0 < ends_.s1 ? ends_.s1 - ends_.s0 : ends_.s0 - ends_.s1;
-    return multiply(whole, static_cast<uint16_t>(share.high)).high;
+uint32_t stretch_after(const Change& change) {
+    if (change.stretch == change.target) return change.target;
+    return change.stretch < change.target ? slowed(change) : sped_up(change);
+}
+
+void Slice::begin(const Stretch& path) {
+    path_ = path;
+    reciprocal_ = 0;
+    ticks_ = path.path_ticks;
+    plain_ = path.s0 == ONE && path.s1 == ONE;
+    if (plain_) return;
+    ticks_ = multiply_q16(path.path_ticks, (path.s0 + path.s1) >> 1);
+    if (path.s0 != path.s1) reciprocal_ = 0xFFFFFFFF / path.path_ticks;
 }
 
 uint32_t Slice::stretch_at(uint16_t path) const {
-    const uint32_t change = change_at(path);
-    return ends_.s0 < ends_.s1 ? ends_.s0 + change : ends_.s0 - change;
+    const uint16_t share = static_cast<uint16_t>(multiply(reciprocal_, path).high);  // of the slice, in 2^-16
+    const bool falls = path_.s1 < path_.s0;
+    const uint32_t whole = falls ? path_.s0 - path_.s1 : path_.s1 - path_.s0;
+    const uint32_t change = multiply(whole, share).high;
+    return falls ? path_.s0 - change : path_.s0 + change;
 }
 
 uint32_t Slice::ticks_at(uint16_t path) const {
-    if (is_plain()) return ends_.start_ticks + path;
-    const uint32_t half_change = change_at(path) >> 1;
-    const uint32_t mean = ends_.s0 < ends_.s1 ? ends_.s0 + half_change : ends_.s0 - half_change;
-    return ends_.start_ticks + multiply(mean, path).high;
+    if (is_plain()) return path_.start_ticks + path;
+    const uint32_t end = stretch_at(path);
+    const uint32_t mean = (path_.s0 + end + (end < path_.s0 ? 1 : 0)) >> 1;  // rounded to the start's side
+    return path_.start_ticks + multiply(mean, path).high;
 }
 
 }  // namespace path_clock

@@ -30,45 +30,43 @@ struct Change {
 };
 
 // The stretch at the end of the slice, as near to the target as the rate allows.
-uint32_t slowed(const Change& change);
-uint32_t sped_up(const Change& change);
+uint32_t stretch_after(const Change& change);
+
+// Path that the clock is to go.
+struct Stretch {
+    uint32_t from_path;  // in its segment
+    uint32_t path_ticks;
+    uint32_t start_ticks;
+    uint32_t s0;
+    uint32_t s1;
+    bool ends_segment;
+};
 
 // A stretch of the path in which the rate changes evenly.
 class Slice {
   public:
-    struct Ends {
-        uint32_t from_path;  // in its segment
-        uint32_t path_ticks;
-        uint32_t start_ticks;
-        uint32_t s0;
-        uint32_t s1;
-        bool ends_segment;
-    };
+    void begin(const Stretch& path);
 
-    Slice() = default;
-    explicit Slice(const Ends& ends);
-
-    bool is_plain() const { return ends_.s0 == ONE && ends_.s1 == ONE; }
-    bool ends_segment() const { return ends_.ends_segment; }
+    bool is_plain() const { return plain_; }
+    bool ends_segment() const { return path_.ends_segment; }
     uint32_t ticks() const { return ticks_; }
-    uint32_t end_path() const { return ends_.from_path + ends_.path_ticks; }
-    uint32_t least_stretch() const { return ends_.s0 < ends_.s1 ? ends_.s0 : ends_.s1; }
+    uint32_t end_path() const { return path_.from_path + path_.path_ticks; }
+    uint32_t least_stretch() const { return path_.s0 < path_.s1 ? path_.s0 : path_.s1; }
 
     // Path time since the slice's start of a path time of the segment, before the slice's end.
-    uint16_t path_of(uint32_t path) const { return static_cast<uint16_t>(path - ends_.from_path); }
+    uint16_t path_of(uint32_t path) const { return static_cast<uint16_t>(path - path_.from_path); }
     // The tick of such a path time, and the stretch there.
     uint32_t ticks_at(uint16_t path) const;
     uint32_t stretch_at(uint16_t path) const;
 
     // The clock stood still.
-    void shift(uint32_t ticks) { ends_.start_ticks += ticks; }
+    void shift(uint32_t ticks) { path_.start_ticks += ticks; }
 
   private:
-    uint32_t change_at(uint16_t path) const;
-
-    Ends ends_ = {0, 0, 0, ONE, ONE, true};
-    uint32_t ticks_ = 0;
-    uint32_t reciprocal_ = 0;  // 2^32 / path_ticks
+    Stretch path_;
+    uint32_t ticks_;
+    uint32_t reciprocal_;  // 2^32 / path_ticks
+    bool plain_;           // at a stretch of 1
 };
 
 }  // namespace path_clock

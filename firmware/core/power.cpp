@@ -1,6 +1,7 @@
 #include "power.h"
 
 #include "clock.h"
+#include "hal_base.h"
 #include "hal_journal.h"
 #include "hal_pins.h"
 
@@ -13,60 +14,69 @@ constexpr uint32_t TICKS_A_MS = wire::TICKS_HZ / 1000;
 // The mark in EEPROM takes four bytes of 3.4 ms each.
 constexpr uint32_t MARK_TICKS = 20 * TICKS_A_MS;
 
-Config config;
-bool energised;
-uint32_t awake_ticks;
-bool waking;
-uint32_t idle_for_ms;
-uint32_t counted_ticks;
+struct Power {
+    Config config;
+    bool energised;
+    bool waking;
+    uint32_t awake_ticks;
+    uint32_t idle_for_ms;
+    uint32_t counted_ticks;
+};
+
+Power power;
 
 }  // namespace
 
 void reset() {
-    counted_ticks = clock::pass_ticks();
-    config = {0, 0, wire::DEFAULT_WAKE_TICKS};
-    energised = waking = false;
-    idle_for_ms = 0;
+    Power& at = hal::by_base(power);
+    at = Power();
+    at.config.wake_ticks = wire::DEFAULT_WAKE_TICKS;
+    at.counted_ticks = clock::pass_ticks();
 }
 
 void configure(const Config& told) {
-    config = told;
+    power.config = told;
     hal::set_enable_active_high(has_option(ENABLE_ACTIVE_HIGH));
     hal::drivers_enable(false);
 }
 
-bool has_option(Option option) { return (config.options & option) != 0; }
+bool has_option(Option option) { return (power.config.options & option) != 0; }
 
 void energise() {
     hal::journal_mark(true);
     hal::drivers_enable(true);
-    energised = waking = true;
-    awake_ticks = clock::pass_ticks() + (config.wake_ticks > MARK_TICKS ? config.wake_ticks : MARK_TICKS);
+    Power& at = hal::by_base(power);
+    at.energised = at.waking = true;
+    const uint32_t wake_ticks = at.config.wake_ticks;
+    at.awake_ticks = clock::pass_ticks() + (wake_ticks > MARK_TICKS ? wake_ticks : MARK_TICKS);
 }
 
 void release() {
     hal::drivers_enable(false);
-    if (energised) hal::journal_mark(false);
-    energised = waking = false;
+    if (power.energised) hal::journal_mark(false);
+    power.energised = power.waking = false;
 }
 
 uint32_t ready_ticks() {
-    waking = waking && !clock::has_come(awake_ticks);
-    return waking ? awake_ticks : clock::pass_ticks();
+    Power& at = hal::by_base(power);
+    if (clock::has_come(at.awake_ticks)) at.waking = false;
+    return at.waking ? at.awake_ticks : clock::pass_ticks();
 }
 
 void note_activity() {
-    idle_for_ms = 0;
-    counted_ticks = clock::pass_ticks();
+    Power& at = hal::by_base(power);
+    at.idle_for_ms = 0;
+    at.counted_ticks = clock::pass_ticks();
 }
 
 bool is_idle_too_long() {
     ready_ticks();  // notices that they woke before the clock has gone round
-    if (clock::pass_ticks() - counted_ticks >= TICKS_A_MS) {
-        counted_ticks += TICKS_A_MS;
-        ++idle_for_ms;
+    Power& at = hal::by_base(power);
+    if (clock::has_come(at.counted_ticks + TICKS_A_MS)) {
+        at.counted_ticks += TICKS_A_MS;
+        ++at.idle_for_ms;
     }
-    return config.idle_ms != 0 && energised && idle_for_ms >= config.idle_ms;
+    return at.config.idle_ms != 0 && at.energised && at.idle_for_ms >= at.config.idle_ms;
 }
 
 }  // namespace power

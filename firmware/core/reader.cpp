@@ -13,8 +13,6 @@ uint32_t join(uint8_t b0, uint8_t b1, uint8_t b2, uint8_t b3) {
     return low | (static_cast<uint32_t>(high) << 16);
 }
 
-uint8_t bits(unsigned value) { return static_cast<uint8_t>(value); }
-
 }  // namespace
 
 // Leaves nothing to read, so that every later field fails as well.
@@ -24,40 +22,29 @@ uint32_t Reader::fail() {
     return 0;
 }
 
-uint16_t Reader::u16() {
-    const uint8_t low = u8();
-    return static_cast<uint16_t>(low | (u8() << 8));
+uint8_t Reader::u8() {
+    if (left_ == 0) return static_cast<uint8_t>(fail());
+    const uint8_t byte = *at_++;
+    if (at_ == ring_end_) at_ = ring_;
+    --left_;
+    return byte;
 }
 
-uint32_t Reader::u32() {
-    if (left_ < 4) return fail();
-    const uint8_t b0 = next();
-    const uint8_t b1 = next();
-    const uint8_t b2 = next();
-    return join(b0, b1, b2, next());
-}
-
-// Seven bits a byte, written out byte by byte because shifts of a number cost an 8-bit machine a loop.
+// Seven bits a byte. A product with a power of two brings them to their place in two bytes of the number,
+// which is two cycles where a shift is a loop.
 uint32_t Reader::varuint() {
-    if (left_ == 0) return fail();
-    const uint8_t b0 = next();
-    if (b0 < MORE) return b0;
-    if (left_ == 0) return fail();
-    const uint8_t b1 = next();
-    const uint8_t r0 = bits((b0 & 0x7F) | (b1 << 7));
-    if (b1 < MORE) return b1 == 0 ? fail() : join(r0, bits(b1 >> 1), 0, 0);
-    if (left_ == 0) return fail();
-    const uint8_t b2 = next();
-    const uint8_t r1 = bits(((b1 & 0x7F) >> 1) | (b2 << 6));
-    if (b2 < MORE) return b2 == 0 ? fail() : join(r0, r1, bits(b2 >> 2), 0);
-    if (left_ == 0) return fail();
-    const uint8_t b3 = next();
-    const uint8_t r2 = bits(((b2 & 0x7F) >> 2) | (b3 << 5));
-    if (b3 < MORE) return b3 == 0 ? fail() : join(r0, r1, r2, bits(b3 >> 3));
-    if (left_ == 0) return fail();
-    const uint8_t b4 = next();
-    if (b4 == 0 || b4 > 0x0F) return fail();
-    return join(r0, r1, r2, bits(((b3 & 0x7F) >> 3) | (b4 << 4)));
+    uint8_t byte = u8();
+    uint8_t bytes[5] = {static_cast<uint8_t>(byte & ~MORE)};
+    uint8_t* at = bytes;
+    for (uint8_t place = 0x80; byte >= MORE; place = static_cast<uint8_t>(place >> 1)) {
+        byte = u8();
+        if (byte == 0 || place < 0x10) return fail();  // cut short, needless, or a sixth
+        const uint16_t wide = static_cast<uint16_t>((byte & ~MORE) * place);
+        *at = static_cast<uint8_t>(*at | wide);
+        *++at = static_cast<uint8_t>(wide >> 8);
+    }
+    if (bytes[4] != 0) return fail();
+    return join(bytes[0], bytes[1], bytes[2], bytes[3]);
 }
 
 int32_t Reader::varint() {

@@ -17,20 +17,11 @@ class Reader {
     // False once a field was cut short or too large; every field read from then on is 0.
     bool ok() const { return ok_; }
 
-    uint8_t u8() { return left_ == 0 ? static_cast<uint8_t>(fail()) : next(); }
-    uint16_t u16();
-    uint32_t u32();
-    int32_t i32() { return static_cast<int32_t>(u32()); }
+    uint8_t u8();
     uint32_t varuint();
     int32_t varint();
 
   private:
-    uint8_t next() {
-        const uint8_t byte = *at_++;
-        if (at_ == ring_end_) at_ = ring_;
-        --left_;
-        return byte;
-    }
     uint32_t fail();
 
     const uint8_t* at_ = nullptr;

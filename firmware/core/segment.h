@@ -24,19 +24,12 @@ struct Segment {
     Move moves[wire::JOINTS];
 };
 
-// Time from each joint's last queued step to the end of the queue, saturated; a joint that has not moved yet
+// Time from a joint's last queued step to the end of the queue, saturated; a joint that has not moved yet
 // counts as resting for ever.
 struct Rest {
     static constexpr uint32_t FOREVER = 0xFFFFFFFF;
-    uint32_t ticks[wire::JOINTS];
-    bool positive[wire::JOINTS];  // the direction of that step
-
-    Rest() {
-        for (uint8_t joint = 0; joint < wire::JOINTS; ++joint) {
-            ticks[joint] = FOREVER;
-            positive[joint] = false;
-        }
-    }
+    uint32_t ticks = FOREVER;
+    bool positive = false;  // the direction of that step
 };
 
 // Least time between two steps of a joint in opposite directions.
@@ -49,7 +42,8 @@ bool run_ticks(const Move& move, uint32_t& ticks);
 // Reads the fields of the next segment.
 void read_segment(Reader& reader, Segment& segment);
 
-// Checks a segment that follows after `rest`, and carries `rest` on to its end. OK or OUT_OF_RANGE.
-wire::Result check_segment(Segment& segment, Rest& rest);
+// Checks a segment that follows after the joints' rests, and carries those on to its end. False when it
+// breaks a limit.
+bool check_segment(const Segment& segment, Rest (&rests)[wire::JOINTS]);
 
 }  // namespace planarm

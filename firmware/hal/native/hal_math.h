@@ -13,6 +13,18 @@ inline Fixed48 multiply(uint32_t a, uint16_t b) {
     return {static_cast<uint32_t>(product >> 16), static_cast<uint16_t>(product)};
 }
 
+inline uint64_t whole(Fixed48 value) { return (static_cast<uint64_t>(value.high) << 16) | value.low; }
+
+inline void add_to(Fixed48& sum, Fixed48 term) {
+    const uint64_t total = whole(sum) + whole(term);
+    sum = {static_cast<uint32_t>(total >> 16), static_cast<uint16_t>(total)};
+}
+
+inline void subtract_from(Fixed48& sum, Fixed48 term) {
+    const uint64_t rest = whole(sum) - whole(term);
+    sum = {static_cast<uint32_t>(rest >> 16), static_cast<uint16_t>(rest)};
+}
+
 // 2^16 a / b, rounded down; it must fit.
 inline uint32_t divide_q16(uint32_t a, uint8_t b) {
     return static_cast<uint32_t>((static_cast<uint64_t>(a) << 16) / b);

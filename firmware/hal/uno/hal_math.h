@@ -11,6 +11,10 @@ namespace hal {
 // a b, in 48 bits; 62 cycles with call and return.
 Fixed48 multiply(uint32_t a, uint16_t b);
 
+// sum += term and sum -= term; 38 cycles with call and return.
+void add_to(Fixed48& sum, Fixed48 term);
+void subtract_from(Fixed48& sum, Fixed48 term);
+
 // 2^16 a / b, rounded down; it must fit. About 380 cycles.
 uint32_t divide_q16(uint32_t a, uint8_t b);
 

@@ -46,6 +46,59 @@ __attribute__((naked, noinline)) Fixed48 multiply(uint32_t, uint16_t) {
         )");
 }
 
+// The sum's address in r25 and r24; the term's high in r21 to r18, its low in r23 and r22.
+__attribute__((naked, noinline)) void add_to(Fixed48&, Fixed48) {
+    __asm__ __volatile__(
+        R"(
+        movw r30, r24
+        ldd  r24, Z + 4
+        add  r24, r22
+        std  Z + 4, r24
+        ldd  r24, Z + 5
+        adc  r24, r23
+        std  Z + 5, r24
+        ldd  r24, Z + 0
+        adc  r24, r18
+        std  Z + 0, r24
+        ldd  r24, Z + 1
+        adc  r24, r19
+        std  Z + 1, r24
+        ldd  r24, Z + 2
+        adc  r24, r20
+        std  Z + 2, r24
+        ldd  r24, Z + 3
+        adc  r24, r21
+        std  Z + 3, r24
+        ret
+        )");
+}
+
+__attribute__((naked, noinline)) void subtract_from(Fixed48&, Fixed48) {
+    __asm__ __volatile__(
+        R"(
+        movw r30, r24
+        ldd  r24, Z + 4
+        sub  r24, r22
+        std  Z + 4, r24
+        ldd  r24, Z + 5
+        sbc  r24, r23
+        std  Z + 5, r24
+        ldd  r24, Z + 0
+        sbc  r24, r18
+        std  Z + 0, r24
+        ldd  r24, Z + 1
+        sbc  r24, r19
+        std  Z + 1, r24
+        ldd  r24, Z + 2
+        sbc  r24, r20
+        std  Z + 2, r24
+        ldd  r24, Z + 3
+        sbc  r24, r21
+        std  Z + 3, r24
+        ret
+        )");
+}
+
 // Long division, bit by bit: the quotient's bits enter where the dividend's leave. a in r25 to r22, b in r20;
 // the sixteen bits behind a are r27 and r26, what is left over is r21.
 __attribute__((naked, noinline)) uint32_t divide_q16(uint32_t, uint8_t) {

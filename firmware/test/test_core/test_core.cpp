@@ -104,7 +104,7 @@ CASE(a_speeding_up_keeps_to_its_allowance_and_never_turns_into_a_slowing) {
         const uint32_t target = ONE + random_below(stretch - ONE + 1);
         const uint32_t path_ticks = 1 + random_below(wire::SLICE_TICKS);
         const uint32_t rate = planarm::path_clock::rate_value(static_cast<uint8_t>(random_below(256))) >> 1;
-        const uint32_t end = planarm::path_clock::sped_up({stretch, target, rate, path_ticks});
+        const uint32_t end = planarm::path_clock::stretch_after({stretch, target, rate, path_ticks});
         CHECK(end >= target && end <= stretch);
         const double s1 = end / 65536.0;
         const double lawful = s1 + rate / 4294967296.0 * path_ticks * s1 * s1 * s1;

@@ -1,0 +1,15 @@
+// State that is reached from a base register.
+#pragma once
+
+namespace hal {
+
+// The same object, by an address that the compiler must take from a register. A byte at a known address takes
+// four bytes of code to load or store, one near a base register two.
+template <typename State>
+inline __attribute__((always_inline)) State& by_base(State& state) {
+    State* base = &state;
+    __asm__("" : "+b"(base));
+    return *base;
+}
+
+}  // namespace hal
