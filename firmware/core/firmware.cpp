@@ -23,7 +23,7 @@ namespace {
 constexpr uint8_t PASSES_A_LOOK = 4;
 
 // Bytes decoded in one pass, so that the motion is looked after often.
-constexpr uint8_t BYTES_A_PASS = 8;
+constexpr uint8_t BYTES_A_PASS = 16;
 
 FrameReceiver receiver;
 uint8_t seen_holds;
@@ -130,12 +130,13 @@ void serve_rest() {
 }
 
 void receive() {
-    uint8_t byte;
-    for (uint8_t i = 0; i < BYTES_A_PASS && hal::serial_read(byte); ++i) {
-        const FrameReceiver::Event event = receiver.receive(byte);
-        if (event == FrameReceiver::Event::DAMAGED) session::on_damage();
-        if (event == FrameReceiver::Event::FRAME) return session::on_frame(receiver.frame());
-    }
+    const uint8_t* bytes;
+    const uint8_t count = hal::serial_peek(bytes);
+    if (count == 0) return;
+    FrameReceiver::Event event;
+    hal::serial_drop(receiver.receive(bytes, count < BYTES_A_PASS ? count : BYTES_A_PASS, event));
+    if (event == FrameReceiver::Event::DAMAGED) session::on_damage();
+    if (event == FrameReceiver::Event::FRAME) session::on_frame(receiver.frame());
 }
 
 }  // namespace

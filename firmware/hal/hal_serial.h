@@ -8,8 +8,9 @@ namespace hal {
 // Switches the USART on. Interrupts are still off.
 void serial_init();
 
-// Takes the oldest received byte; false when there is none.
-bool serial_read(uint8_t& byte);
+// The oldest received bytes, as many as lie together; returns how many. They stay until they are dropped.
+uint8_t serial_peek(const uint8_t*& bytes);
+void serial_drop(uint8_t count);
 
 // True when no reply is being sent.
 bool serial_can_send();

@@ -42,7 +42,9 @@ struct Board {
     bool dirs[wire::JOINTS];
     bool enable_high;
     std::deque<planarm_edge> edges;
-    std::deque<uint8_t> received;
+    uint8_t ring[wire::RX_RING_BYTES];
+    uint8_t ring_head;  // bytes received and taken, modulo 256
+    uint8_t ring_tail;
     std::deque<uint8_t> sent;
     uint64_t sending_until;
     uint8_t ring_full;
@@ -194,12 +196,16 @@ void emergency_clear() {
 
 void watchdog_feed() {}
 
-bool serial_read(uint8_t& byte) {
-    if (uno.received.empty()) return false;
-    byte = uno.received.front();
-    uno.received.pop_front();
-    return true;
+uint8_t serial_peek(const uint8_t*& bytes) {
+    const uint8_t at = uno.ring_tail % planarm::wire::RX_RING_BYTES;
+    const uint8_t count = static_cast<uint8_t>(uno.ring_head - uno.ring_tail);
+    bytes = uno.ring + at;
+    return count < planarm::wire::RX_RING_BYTES - at
+               ? count
+               : static_cast<uint8_t>(planarm::wire::RX_RING_BYTES - at);
 }
+
+void serial_drop(uint8_t count) { uno.ring_tail = static_cast<uint8_t>(uno.ring_tail + count); }
 
 bool serial_can_send() { return uno.now >= uno.sending_until; }
 
@@ -248,10 +254,10 @@ void receive_byte(uint8_t byte) {
     uno.emergency_run = 0;
     if (byte == wire::HOLD_CODE) {
         ++uno.holds;
-    } else if (uno.received.size() == wire::RX_RING_BYTES) {
+    } else if (static_cast<uint8_t>(uno.ring_head - uno.ring_tail) == wire::RX_RING_BYTES) {
         ++uno.ring_full;
     } else {
-        uno.received.push_back(byte);
+        uno.ring[uno.ring_head++ % wire::RX_RING_BYTES] = byte;
     }
 }
 

@@ -19,7 +19,7 @@ constexpr uint32_t BAUD_DIVIDER = TICKS_HZ / (8 * BAUD);  // double speed, ATmeg
 static_assert(BAUD_DIVIDER * 8 * BAUD == TICKS_HZ, "the baud rate must be exact");
 static_assert((RX_RING_BYTES & (RX_RING_BYTES - 1)) == 0, "ring indices wrap by a mask");
 
-volatile uint8_t ring[RX_RING_BYTES];  // written by the interrupt
+uint8_t ring[RX_RING_BYTES];  // written by the interrupt
 
 // Received bytes and bytes taken, the emergency bytes in a row, and bytes lost in the USART, all modulo 256,
 // where IN and OUT reach them: timer 0 stands still.
@@ -45,12 +45,20 @@ void serial_init() {
     UCSR0B = _BV(RXCIE0) | _BV(RXEN0) | _BV(TXEN0);
 }
 
-bool serial_read(uint8_t& byte) {
+// The ring's bytes are not volatile: those behind the head are the interrupt's, the others are not written.
+uint8_t serial_peek(const uint8_t*& bytes) {
     const uint8_t tail = RING_TAIL;
-    if (tail == RING_HEAD) return false;
-    byte = ring[tail & (RX_RING_BYTES - 1)];
-    RING_TAIL = static_cast<uint8_t>(tail + 1);
-    return true;
+    const uint8_t count = static_cast<uint8_t>(RING_HEAD - tail);
+    compiler_barrier();
+    const uint8_t at = tail & (RX_RING_BYTES - 1);
+    const uint8_t together = static_cast<uint8_t>(RX_RING_BYTES - at);
+    bytes = ring + at;
+    return count < together ? count : together;
+}
+
+void serial_drop(uint8_t count) {
+    compiler_barrier();
+    RING_TAIL = static_cast<uint8_t>(RING_TAIL + count);
 }
 
 bool serial_can_send() { return sending_left == 0; }
