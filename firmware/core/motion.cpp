@@ -2,6 +2,7 @@
 
 #include "clock.h"
 #include "cursor.h"
+#include "hal_base.h"
 #include "path_clock.h"
 #include "queue.h"
 #include "segment.h"
@@ -57,33 +58,6 @@ Check checked;
 
 // -- what is being worked off --
 
-bool running;
-uint32_t begin_ticks;  // start of the motion
-Wish wish;
-uint8_t percent;
-uint32_t override_stretch;
-
-Reader payload;  // the oldest, being read
-bool reading;
-uint32_t slow_value;
-uint32_t fast_value;
-uint32_t need_ticks;
-
-bool in_segment;
-uint32_t segment_ticks;
-uint32_t slice_ticks;  // of its slices but the last
-bool segment_last;
-uint32_t path_at;  // in the segment, where the next slice begins
-
-Cursor cursors[wire::JOINTS];
-Slice slice;  // being filled, or the last one filled
-bool filling;
-bool urgent;   // the last call of serve handed something over
-uint8_t turn;  // the joint whose run was handed over last
-
-uint32_t stretch;        // at the end of the last slice
-uint32_t prepare_ticks;  // start of the next slice
-
 // Slices handed over and not yet executed, oldest first.
 struct Prepared {
     uint32_t end_ticks;
@@ -93,22 +67,80 @@ struct Prepared {
 };
 
 Prepared prepared[MAX_SLICES];
-uint8_t prepared_count;
-uint32_t executed_segments;
+Cursor cursors[wire::JOINTS];
+Slice slice;     // being filled, or the last one filled
+Reader payload;  // the oldest, being read
 
-bool frozen;
-bool starved;  // frozen because the queue ran low
-uint32_t frozen_ticks;
+class Motion {
+  public:
+    // What the functions of the same names in motion.h tell.
+    void reset();
+    void start(uint32_t start_ticks);
+    void set_wish(Wish wished) { wish = wished; }
+    void set_override(uint8_t to_percent);
+    uint8_t override_percent() const { return percent; }
+    uint8_t rate_percent() const;
+    bool is_urgent() const { return running && !frozen && filling && urgent; }
+    Progress serve();
+    void halt();
+    uint32_t tell_ledger(wire::Ledger& ledger) const;
+
+    // True when a motion goes on and has nothing left to do but what is prepared, with when that ends.
+    bool is_out_of_road(uint32_t& end_ticks) const;
+
+  private:
+    bool is_starving(uint32_t path_ticks, uint32_t margin_ticks) const;
+    void read_next_segment();
+    void open_slice();
+    bool fill_slice();
+    void prepare();
+    bool retire(bool& ends_motion);
+    void clear();
+    void thaw();
+    bool may_freeze() const;
+    Progress serve_frozen();
+    Progress freeze_if_due();
+
+    bool running;
+    bool frozen;
+    bool starved;  // frozen because the queue ran low
+    uint32_t frozen_ticks;
+    uint32_t begin_ticks;  // start of the motion
+
+    Wish wish;
+    uint8_t percent;
+    uint32_t override_stretch;
+
+    bool reading;  // a payload
+    uint32_t slow_value;
+    uint32_t fast_value;
+    uint32_t need_ticks;
+
+    bool in_segment;
+    bool segment_last;
+    uint32_t segment_ticks;
+    uint16_t slice_ticks;  // of its slices but the last
+
+    bool filling;  // a slice
+    bool urgent;   // the last call of serve handed something over
+    uint8_t turn;  // the joint whose run was handed over last
+    uint8_t prepared_count;
+    uint32_t executed_segments;
+};
+
+Motion motion;
+
+Motion& current() { return hal::by_base(motion); }
 
 // True when the path that is left after `path_ticks` of the segment is too short to rest on.
-bool is_starving(uint32_t path_ticks, uint32_t margin_ticks) {
+bool Motion::is_starving(uint32_t path_ticks, uint32_t margin_ticks) const {
     if (queue_end.complete || segment_last || queue::free_bytes() < FULL_BYTES) return false;
     const uint32_t rest_of_segment = in_segment ? segment_ticks - path_ticks : 0;
     return add_saturated(queued_path_ticks, rest_of_segment) < need_ticks + margin_ticks;
 }
 
 // Apart from serve, whose frame on the stack lies below the deepest calls.
-[[gnu::noinline]] void read_next_segment() {
+[[gnu::noinline]] void Motion::read_next_segment() {
     if (!reading) {
         if (queue::is_empty()) return;
         payload = queue::front();
@@ -123,30 +155,18 @@ bool is_starving(uint32_t path_ticks, uint32_t margin_ticks) {
         queue::release();
         reading = false;
     }
-    segment_ticks = slice_ticks = segment.duration_ticks;
-    if (slice_ticks > wire::SLICE_TICKS) {
+    segment_ticks = segment.duration_ticks;
+    slice_ticks = static_cast<uint16_t>(segment_ticks);
+    if (segment_ticks > wire::SLICE_TICKS) {
         const uint32_t slices = (segment_ticks - 1) / wire::SLICE_TICKS + 1;
-        slice_ticks = (segment_ticks - 1) / slices + 1;
+        slice_ticks = static_cast<uint16_t>((segment_ticks - 1) / slices + 1);
     }
     segment_last = segment.last;
     if (queued_path_ticks != 0xFFFFFFFF) queued_path_ticks -= segment_ticks;
     if (queue::is_empty()) queued_path_ticks = 0;
     for (uint8_t joint = 0; joint < wire::JOINTS; ++joint) cursors[joint].begin(segment.moves[joint]);
-    path_at = 0;
+    slice.begin_segment();
     in_segment = true;
-}
-
-// The stretch at the end of the next slice.
-uint32_t next_stretch(uint32_t path_ticks) {
-    const bool quickly =
-        wish == Wish::REST_QUICKLY || is_starving(path_at + path_ticks, STARVING_MARGIN_TICKS);
-    path_clock::Change change;
-    change.stretch = stretch;
-    change.target = quickly || wish == Wish::REST ? path_clock::MAX_STRETCH : override_stretch;
-    change.rate = change.target > stretch ? slow_value : fast_value;
-    if (!quickly) change.rate >>= 1;
-    change.path_ticks = path_ticks;
-    return path_clock::stretch_after(change);
 }
 
 bool is_calm() {
@@ -156,55 +176,54 @@ bool is_calm() {
     return true;
 }
 
-[[gnu::noinline]] void open_slice() {
-    path_clock::Stretch path;
-    path.from_path = path_at;
-    path.path_ticks = segment_ticks - path_at;
-    path.ends_segment = path.path_ticks <= slice_ticks;
-    if (!path.ends_segment) path.path_ticks = slice_ticks;
-    path.start_ticks = prepare_ticks;
-    path.s0 = stretch;
-    path.s1 = stretch = next_stretch(path.path_ticks);
-    slice.begin(path);
-    path_at = slice.end_path();
-    prepare_ticks += slice.ticks();
+[[gnu::noinline]] void Motion::open_slice() {
+    const uint32_t left_ticks = segment_ticks - slice.end_path();
+    path_clock::Way way;
+    way.ends_segment = left_ticks <= slice_ticks;
+    way.path_ticks = way.ends_segment ? static_cast<uint16_t>(left_ticks) : slice_ticks;
+    const bool quickly =
+        wish == Wish::REST_QUICKLY || is_starving(slice.end_path() + way.path_ticks, STARVING_MARGIN_TICKS);
+    way.target = quickly || wish == Wish::REST ? path_clock::MAX_STRETCH : override_stretch;
+    way.rate = way.target > slice.end_stretch() ? slow_value : fast_value;
+    if (!quickly) way.rate >>= 1;
+    slice.follow(way);
     Prepared& entry = prepared[prepared_count++];
-    entry.end_ticks = prepare_ticks;
-    entry.ends_segment = path.ends_segment;
-    entry.ends_motion = path.ends_segment && segment_last;
+    entry.end_ticks = slice.end_ticks();
+    entry.ends_segment = way.ends_segment;
+    entry.ends_motion = way.ends_segment && segment_last;
     entry.calm = is_calm();
     filling = true;
 }
 
 // Hands one run over, of each joint in its turn. True when nothing of the slice is left.
-bool fill_slice() {
+bool Motion::fill_slice() {
     bool more = false;
     uint8_t joint = turn;
     for (uint8_t i = 0; i < wire::JOINTS; ++i) {
         joint = joint == wire::JOINTS - 1 ? 0 : static_cast<uint8_t>(joint + 1);
         Cursor& cursor = cursors[joint];
-        if (!cursor.has_step_before(path_at)) continue;
+        if (!cursor.has_step_before(slice.end_path())) continue;
         if (!urgent && step_engine::has_room(joint)) {
             step_engine::append(joint, cursor.take(slice));
             urgent = true;
             turn = joint;
         }
-        more = more || cursor.has_step_before(path_at);
+        more = more || cursor.has_step_before(slice.end_path());
     }
     if (more) return false;
-    if (path_at == segment_ticks) {
+    if (slice.ends_segment()) {
         for (Cursor& cursor : cursors) cursor.finish(segment_ticks);
         in_segment = false;
     }
     return true;
 }
 
-void prepare() {
+void Motion::prepare() {
     urgent = false;
     if (!filling) {
         if (!in_segment) read_next_segment();  // as a rule ahead of time
         if (!in_segment) return;
-        const int32_t away_ticks = clock::ticks_until(prepare_ticks);
+        const int32_t away_ticks = clock::ticks_until(slice.end_ticks());
         if (prepared_count == MAX_SLICES || away_ticks > PREPARE_AHEAD_TICKS) return;
         open_slice();
         urgent = !slice.is_plain();  // else there is time for a run, too
@@ -213,7 +232,7 @@ void prepare() {
 }
 
 // Takes executed slices off the list. True when the last of them ended what was received.
-bool retire(bool& ends_motion) {
+bool Motion::retire(bool& ends_motion) {
     while (prepared_count != 0 && clock::has_come(prepared[0].end_ticks)) {
         if (prepared[0].ends_segment) ++executed_segments;
         ends_motion = prepared[0].ends_motion;
@@ -224,51 +243,50 @@ bool retire(bool& ends_motion) {
     return false;
 }
 
-void clear() {
+void Motion::clear() {
     queue::clear();
     queued_path_ticks = 0;
     queue_end.complete = false;
     for (Rest& rest : queue_end.rests) rest = Rest();
     running = reading = in_segment = segment_last = filling = frozen = starved = false;
     wish = Wish::GO;
-    stretch = override_stretch;
+    slice.begin_with(override_stretch);
     prepared_count = 0;
     for (Cursor& cursor : cursors) cursor.reset();
     const step_engine::Position position = step_engine::position();
     for (uint8_t joint = 0; joint < wire::JOINTS; ++joint) queue_end.usteps[joint] = position.usteps[joint];
 }
 
-void thaw() {
+void Motion::thaw() {
     const uint32_t stood_ticks = clock::pass_ticks() + THAW_LEAD_TICKS - frozen_ticks;
     step_engine::shift(stood_ticks);
     for (uint8_t i = 0; i < prepared_count; ++i) prepared[i].end_ticks += stood_ticks;
     for (Cursor& cursor : cursors) cursor.shift(stood_ticks);
     if (static_cast<int32_t>(begin_ticks - frozen_ticks) > 0) begin_ticks += stood_ticks;
-    prepare_ticks += stood_ticks;
     slice.shift(stood_ticks);
     frozen = starved = false;
 }
 
 // True when the slice that is being executed lets the joints stop dead, or none is yet.
-bool may_freeze() {
+bool Motion::may_freeze() const {
     if (!clock::has_come(begin_ticks)) return true;
     return prepared_count != 0 && prepared[0].calm;
 }
 
-[[gnu::noinline]] Progress serve_frozen() {
+[[gnu::noinline]] Progress Motion::serve_frozen() {
     if (wish != Wish::GO) {
         if (!starved) return Progress::GOING;
         starved = false;
         return Progress::AT_REST;
     }
-    if (starved && is_starving(path_at, 2 * STARVING_MARGIN_TICKS)) return Progress::GOING;
+    if (starved && is_starving(slice.end_path(), 2 * STARVING_MARGIN_TICKS)) return Progress::GOING;
     const bool was_starved = starved;
     thaw();
     return was_starved ? Progress::FED : Progress::GOING;
 }
 
-[[gnu::noinline]] Progress freeze_if_due() {
-    const bool starving = wish == Wish::GO && is_starving(path_at, STARVING_MARGIN_TICKS);
+[[gnu::noinline]] Progress Motion::freeze_if_due() {
+    const bool starving = wish == Wish::GO && is_starving(slice.end_path(), STARVING_MARGIN_TICKS);
     if (wish == Wish::GO && !starving) return Progress::GOING;
     if (!may_freeze() || !step_engine::freeze(frozen_ticks)) return Progress::GOING;
     frozen = true;
@@ -276,15 +294,90 @@ bool may_freeze() {
     return starving ? Progress::STARVED : Progress::AT_REST;
 }
 
-}  // namespace
-
-void reset() {
+void Motion::reset() {
     step_engine::reset();
     for (Joint& joint : joints) joint = {wire::DEFAULT_START_STOP_TICKS, 0, -1};
     set_override(100);
     executed_segments = 0;
     clear();
 }
+
+void Motion::start(uint32_t start_ticks) {
+    begin_ticks = start_ticks;
+    slice.begin_at(start_ticks);
+    slice.begin_with(override_stretch);
+    running = true;
+}
+
+void Motion::set_override(uint8_t to_percent) {
+    percent = to_percent;
+    override_stretch = (100 * ONE) / to_percent;
+}
+
+uint8_t Motion::rate_percent() const {
+    if (frozen) return 0;
+    return static_cast<uint8_t>((100 * ONE) / slice.end_stretch());
+}
+
+Progress Motion::serve() {
+    if (!running) return Progress::GOING;
+    if (frozen) return serve_frozen();
+    prepare();
+    if (!step_engine::serve()) return Progress::MISSED;
+    bool ends_motion = false;
+    if (retire(ends_motion)) {
+        clear();
+        return ends_motion ? Progress::DONE : Progress::UNDERRUN;
+    }
+    return freeze_if_due();
+}
+
+void Motion::halt() {
+    bool ends_motion;
+    if (running && !frozen && !step_engine::missed()) retire(ends_motion);
+    step_engine::stop();
+    clear();
+}
+
+uint32_t Motion::tell_ledger(wire::Ledger& ledger) const {
+    const step_engine::Position position = step_engine::position();
+    const uint32_t ticks = clock::extend(position.counter);
+    uint32_t segments = executed_segments;
+    // After a missed step, and while the path clock stands, time does not tell what was executed.
+    const uint8_t timely = step_engine::missed() || frozen ? 0 : prepared_count;
+    for (uint8_t i = 0; i < timely && static_cast<int32_t>(prepared[i].end_ticks - ticks) <= 0; ++i) {
+        if (prepared[i].ends_segment) ++segments;
+    }
+    ledger.executed_segments = segments;
+    for (uint8_t joint = 0; joint < wire::JOINTS; ++joint)
+        ledger.position_usteps[joint] = position.usteps[joint];
+    return ticks;
+}
+
+bool Motion::is_out_of_road(uint32_t& end_ticks) const {
+    end_ticks = slice.end_ticks();
+    return running && !frozen && !in_segment && queue::is_empty();
+}
+
+}  // namespace
+
+void reset() { current().reset(); }
+
+void start(uint32_t start_ticks) { current().start(start_ticks); }
+
+void set_wish(Wish wish) { current().set_wish(wish); }
+
+void set_override(uint8_t percent) { current().set_override(percent); }
+
+uint8_t override_percent() { return current().override_percent(); }
+
+uint8_t rate_percent() { return current().rate_percent(); }
+
+Progress serve() { return current().serve(); }
+
+void halt() { current().halt(); }
+
+uint32_t tell_ledger(wire::Ledger& ledger) { return current().tell_ledger(ledger); }
 
 bool is_complete() { return queue_end.complete; }
 
@@ -322,9 +415,9 @@ bool is_checked() { return checked.reader.at_end(); }
 uint8_t joint_out_of_limits() { return checked.joint_out; }
 
 bool commit(const uint8_t* bytes, uint8_t length) {
-    const bool out_of_road = running && !frozen && !in_segment && queue::is_empty();
-    if (out_of_road && static_cast<int32_t>(prepare_ticks - clock::now()) < LATEST_ARRIVAL_TICKS)
-        return false;
+    uint32_t end_ticks;
+    const bool out_of_road = current().is_out_of_road(end_ticks);
+    if (out_of_road && static_cast<int32_t>(end_ticks - clock::now()) < LATEST_ARRIVAL_TICKS) return false;
     queue::append(bytes, length);
     queued_path_ticks = add_saturated(queued_path_ticks, checked.path_ticks);
     queue_end = checked.end;
@@ -333,65 +426,9 @@ bool commit(const uint8_t* bytes, uint8_t length) {
 
 bool is_empty() { return queue::is_empty(); }
 
-bool is_urgent() { return running && !frozen && filling && urgent; }
+bool is_urgent() { return current().is_urgent(); }
 
 uint16_t free_bytes() { return queue::free_bytes(); }
-
-void start(uint32_t start_ticks) {
-    begin_ticks = prepare_ticks = start_ticks;
-    stretch = override_stretch;
-    running = true;
-}
-
-void set_wish(Wish wished) { wish = wished; }
-
-void set_override(uint8_t to_percent) {
-    percent = to_percent;
-    override_stretch = (100 * ONE) / to_percent;
-}
-
-uint8_t override_percent() { return percent; }
-
-uint8_t rate_percent() {
-    if (frozen) return 0;
-    if (stretch == ONE) return 100;
-    return static_cast<uint8_t>((100 * ONE) / stretch);
-}
-
-Progress serve() {
-    if (!running) return Progress::GOING;
-    if (frozen) return serve_frozen();
-    prepare();
-    if (!step_engine::serve()) return Progress::MISSED;
-    bool ends_motion = false;
-    if (retire(ends_motion)) {
-        clear();
-        return ends_motion ? Progress::DONE : Progress::UNDERRUN;
-    }
-    return freeze_if_due();
-}
-
-void halt() {
-    bool ends_motion;
-    if (running && !frozen && !step_engine::missed()) retire(ends_motion);
-    step_engine::stop();
-    clear();
-}
-
-uint32_t tell_ledger(wire::Ledger& ledger) {
-    const step_engine::Position position = step_engine::position();
-    const uint32_t ticks = clock::extend(position.counter);
-    uint32_t segments = executed_segments;
-    // After a missed step, and while the path clock stands, time does not tell what was executed.
-    const uint8_t timely = step_engine::missed() || frozen ? 0 : prepared_count;
-    for (uint8_t i = 0; i < timely && static_cast<int32_t>(prepared[i].end_ticks - ticks) <= 0; ++i) {
-        if (prepared[i].ends_segment) ++segments;
-    }
-    ledger.executed_segments = segments;
-    for (uint8_t joint = 0; joint < wire::JOINTS; ++joint)
-        ledger.position_usteps[joint] = position.usteps[joint];
-    return ticks;
-}
 
 void set_position(uint8_t joint, int32_t usteps) {
     step_engine::set_position(joint, usteps);

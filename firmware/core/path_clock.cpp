@@ -9,36 +9,33 @@ namespace {
 
 // The change of a slice that is stretched by `stretch` where it changes most, in relation to that: rate x
 // path x stretch^2, in 2^-16.
-uint32_t relative_change(const Change& change, uint32_t stretch) {
-    return multiply_q32(multiply_saturated(change.rate, change.path_ticks), multiply_q16(stretch, stretch));
+uint32_t relative_change(uint32_t rate_path, uint32_t stretch) {
+    return multiply_q32(rate_path, multiply_q16(stretch, stretch));
 }
 
 // At most twice the stretch, so that a quadratic in the number of steps stays a good likeness.
-uint32_t slowed(const Change& change) {
-    uint32_t growth = change.stretch;
-    const uint32_t relative = relative_change(change, change.stretch);
-    if (relative < ONE) growth = multiply_q16(growth, relative);
-    const uint32_t end = change.stretch + growth;
-    return end < change.target ? end : change.target;
+uint32_t slowed(uint32_t stretch, uint32_t rate_path) {
+    const uint32_t relative = relative_change(rate_path, stretch);
+    return stretch + (relative < ONE ? multiply_q16(stretch, relative) : stretch);
 }
 
 // The root of s + F D s^3 = s0 by Newton's method from above: it comes down to the root and does not pass it
 // but for a rounding, where it ends. So each turn gives a lawful stretch and three are near enough.
-uint32_t sped_up(const Change& change) {
-    uint32_t end = change.stretch;
+uint32_t sped_up(uint32_t stretch, uint32_t rate_path) {
+    uint32_t end = stretch;
     for (uint8_t turn = 0; turn < 3; ++turn) {
-        const uint32_t relative = relative_change(change, end);
+        const uint32_t relative = relative_change(rate_path, end);
         if (relative >= 8 * ONE) {  // the step is nearly end / 3
             end -= end >> 2;
             continue;
         }
         const uint32_t growth = multiply_q16(end, relative);
-        const uint32_t gap = change.stretch - end;
+        const uint32_t gap = stretch - end;
         if (growth <= gap) break;
         const uint32_t slope = ((ONE + 3 * relative) >> 8) + 1;
         end -= ((growth - gap) / slope) << 8;
     }
-    return end > change.target ? end : change.target;
+    return end;
 }
 
 }  // namespace
@@ -52,34 +49,41 @@ uint32_t rate_value(uint8_t code) {
     return value;
 }
 
-uint32_t stretch_after(const Change& change) {
-    if (change.stretch == change.target) return change.target;
-    return change.stretch < change.target ? slowed(change) : sped_up(change);
+uint32_t stretch_after(uint32_t stretch, const Way& way) {
+    const uint32_t target = way.target;
+    const uint32_t rate_path = multiply_saturated(way.rate, way.path_ticks);
+    if (stretch < target) {
+        const uint32_t end = slowed(stretch, rate_path);
+        return end < target ? end : target;
+    }
+    const uint32_t end = sped_up(stretch, rate_path);
+    return end > target ? end : target;
 }
 
-void Slice::begin(const Stretch& path) {
-    path_ = path;
-    reciprocal_ = 0;
-    ticks_ = path.path_ticks;
-    plain_ = path.s0 == ONE && path.s1 == ONE;
-    if (plain_) return;
-    ticks_ = multiply_q16(path.path_ticks, (path.s0 + path.s1) >> 1);
-    if (path.s0 != path.s1) reciprocal_ = 0xFFFFFFFF / path.path_ticks;
+void Slice::follow(const Way& way) {
+    from_path_ = static_cast<uint16_t>(end_path_);
+    end_path_ += way.path_ticks;
+    start_ticks_ = end_ticks_;
+    ends_segment_ = way.ends_segment;
+    s0_ = s1_;
+    if (s1_ != way.target) s1_ = stretch_after(s1_, way);
+    plain_ = s0_ == ONE && s1_ == ONE;
+    end_ticks_ += plain_ ? way.path_ticks : multiply((s0_ + s1_) >> 1, way.path_ticks).high;
+    if (s0_ != s1_) reciprocal_ = 0xFFFFFFFF / way.path_ticks;
 }
 
 uint32_t Slice::stretch_at(uint16_t path) const {
+    if (s0_ == s1_) return s0_;
     const uint16_t share = static_cast<uint16_t>(multiply(reciprocal_, path).high);  // of the slice, in 2^-16
-    const bool falls = path_.s1 < path_.s0;
-    const uint32_t whole = falls ? path_.s0 - path_.s1 : path_.s1 - path_.s0;
-    const uint32_t change = multiply(whole, share).high;
-    return falls ? path_.s0 - change : path_.s0 + change;
+    if (s0_ < s1_) return s0_ + multiply(s1_ - s0_, share).high;
+    return s0_ - multiply(s0_ - s1_, share).high;
 }
 
 uint32_t Slice::ticks_at(uint16_t path) const {
-    if (is_plain()) return path_.start_ticks + path;
+    if (is_plain()) return start_ticks_ + path;
     const uint32_t end = stretch_at(path);
-    const uint32_t mean = (path_.s0 + end + (end < path_.s0 ? 1 : 0)) >> 1;  // rounded to the start's side
-    return path_.start_ticks + multiply(mean, path).high;
+    const uint32_t mean = (s0_ + end + (end < s0_ ? 1 : 0)) >> 1;  // rounded to the start's side
+    return start_ticks_ + multiply(mean, path).high;
 }
 
 }  // namespace path_clock

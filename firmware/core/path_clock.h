@@ -16,57 +16,62 @@ namespace path_clock {
 
 constexpr uint32_t ONE = 0x10000;  // a stretch of 1
 constexpr uint32_t MAX_STRETCH = static_cast<uint32_t>(wire::MAX_STRETCH) << 16;
-static_assert(wire::SLICE_TICKS <= 0x10000, "path times in a slice have 16 bits");
+static_assert(wire::SLICE_TICKS <= 0xFFFF, "path times in a slice have 16 bits");
 
 // The value of a rate code, in 2^-32 a tick.
 uint32_t rate_value(uint8_t code);
 
-// A change of the stretch over a slice: from, to at best, by what rate, over how much path.
-struct Change {
-    uint32_t stretch;
+// What is asked of a slice: its length, the stretch that is wished for its end, and by what rate the clock
+// may change.
+struct Way {
+    uint16_t path_ticks;
+    bool ends_segment;
     uint32_t target;
     uint32_t rate;  // in 2^-32 a tick
-    uint32_t path_ticks;
 };
 
-// The stretch at the end of the slice, as near to the target as the rate allows.
-uint32_t stretch_after(const Change& change);
+// The stretch at the way's end, as near to its target as its rate allows.
+uint32_t stretch_after(uint32_t stretch, const Way& way);
 
-// Path that the clock is to go.
-struct Stretch {
-    uint32_t from_path;  // in its segment
-    uint32_t path_ticks;
-    uint32_t start_ticks;
-    uint32_t s0;
-    uint32_t s1;
-    bool ends_segment;
-};
-
-// A stretch of the path in which the rate changes evenly.
+// A stretch of the path in which the rate changes evenly; each goes on from the end of the one before.
 class Slice {
   public:
-    void begin(const Stretch& path);
+    // The next slice begins at this tick, with this stretch.
+    void begin_at(uint32_t ticks) { end_ticks_ = ticks; }
+    void begin_with(uint32_t stretch) { s1_ = stretch; }
+    void begin_segment() { end_path_ = 0; }
 
-    bool is_plain() const { return plain_; }
-    bool ends_segment() const { return path_.ends_segment; }
-    uint32_t ticks() const { return ticks_; }
-    uint32_t end_path() const { return path_.from_path + path_.path_ticks; }
-    uint32_t least_stretch() const { return path_.s0 < path_.s1 ? path_.s0 : path_.s1; }
+    void follow(const Way& way);
+
+    bool is_plain() const { return plain_; }  // at a stretch of 1
+    bool ends_segment() const { return ends_segment_; }
+    uint32_t end_path() const { return end_path_; }  // in its segment
+    uint32_t end_ticks() const { return end_ticks_; }
+    uint32_t end_stretch() const { return s1_; }
+    uint32_t least_stretch() const { return s0_ < s1_ ? s0_ : s1_; }
 
     // Path time since the slice's start of a path time of the segment, before the slice's end.
-    uint16_t path_of(uint32_t path) const { return static_cast<uint16_t>(path - path_.from_path); }
+    uint16_t path_of(uint32_t path) const { return static_cast<uint16_t>(path - from_path_); }
     // The tick of such a path time, and the stretch there.
     uint32_t ticks_at(uint16_t path) const;
     uint32_t stretch_at(uint16_t path) const;
 
     // The clock stood still.
-    void shift(uint32_t ticks) { path_.start_ticks += ticks; }
+    void shift(uint32_t ticks) {
+        start_ticks_ += ticks;
+        end_ticks_ += ticks;
+    }
 
   private:
-    Stretch path_;
-    uint32_t ticks_;
-    uint32_t reciprocal_;  // 2^32 / path_ticks
-    bool plain_;           // at a stretch of 1
+    uint32_t start_ticks_;
+    uint32_t end_ticks_;
+    uint32_t end_path_;
+    uint32_t s0_;
+    uint32_t s1_;
+    uint32_t reciprocal_;  // 2^32 / path ticks
+    uint16_t from_path_;
+    bool plain_;
+    bool ends_segment_;
 };
 
 }  // namespace path_clock
