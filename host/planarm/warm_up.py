@@ -17,7 +17,9 @@ from planarm.model.arm import Arm
 from planarm.model.kinematics import forward
 from planarm.model.moving import later
 from planarm.model.shapes import Circle, Polygon
-from planarm.operations.replanning import first_plan, judge, plan_from
+from planarm.operations.replanning import first_plan, plan_from
+from planarm.operations.splicing import first_border, plan_from_border
+from planarm.operations.verdicts import judge
 from planarm.pipeline import plan_scene, planning_margin_cm
 from planarm.routes.moving_route import find_moving_route, rest_touch
 from planarm.routes.route import find_route
@@ -146,6 +148,9 @@ def warm_up_replanning() -> None:
         _, changes = task.roadmap.add_obstacle(shape)
         task.planner.change(changes)
     plan_from(scene, task, rest_rad, lambda _stage, _share: None)
+    border, margin_cm = first_border(plan, 0, 0.0), planning_margin_cm(scene)
+    assert border is not None, "a motion has more than one segment"
+    plan_from_border(scene, task, plan, border, 0.0, margin_cm)
 
 
 def warm_up_moving() -> None:

@@ -7,7 +7,8 @@ NEW_OVERLOADS = """
 import sys
 from numba.core.registry import CPUDispatcher
 from planarm.model.shapes import Circle, Polygon
-from planarm.operations.replanning import first_plan, judge
+from planarm.operations.replanning import first_plan
+from planarm.operations.verdicts import judge
 from planarm.pipeline import plan_scene
 from planarm.scene import load_scene
 from planarm.warm_up import warm_up

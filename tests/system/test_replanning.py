@@ -1,98 +1,20 @@
 """Obstacles that appear while the emulated arm moves: kept clear of, or the stop before them explained."""
 
-from contextlib import closing
-from dataclasses import replace
-from pathlib import Path
-from time import perf_counter
-
 import numpy as np
 import pytest
 
-from planarm.link.arm_record import ArmSetup
-from planarm.link.transport import open_transport
-from planarm.model.arm import Arm
-from planarm.model.collision import pose_clearance_cm
-from planarm.model.kinematics import forward
-from planarm.model.shapes import obstacle_set, shape_of
-from planarm.operations.arrivals import Listed
-from planarm.operations.replanning import GENTLE_SHARE, first_plan, judge, rest_time_s, run_live
+from live_runs import GOAL, SCENE, Outcome, circle, quiet, tip_at
+from planarm.model.shapes import shape_of
+from planarm.operations.replanning import first_plan
+from planarm.operations.verdicts import GENTLE_SHARE, judge, rest_time_s
 from planarm.pipeline import planning_margin_cm
-from planarm.scene import MechanicsSpec, Obstacle, load_scene
+from planarm.scene import Obstacle
 from planarm.scene.arrivals import Arrival
-from planarm_wire.messages import TICKS_HZ
-
-LENGTHS = (18.0, 26.0)
-START, GOAL = (-0.3, 0.9), (2.2, 0.5)
-SETTLE_S = 0.3
-
-
-def scene_of():
-    """The example's motors on a short inner link, so that the arm can fold past what stands in its way; fast joints.
-
-    Motors follow their steps within about a millimetre, and swing after a stop: 3 mm of clearance are kept for that.
-    """
-    scene = load_scene(Path(__file__).resolve().parents[2] / "examples" / "energy_two_links.toml")
-    arm = replace(scene.arm, link_lengths_cm=LENGTHS)
-    tips = [tuple(map(float, forward(Arm.from_spec(arm), q)[-1])) for q in (START, GOAL)]
-    return replace(
-        scene,
-        arm=arm,
-        joints=tuple(replace(j, max_speed_rad_s=2.5, max_acceleration_rad_s2=12.0) for j in scene.joints),
-        mechanics=MechanicsSpec.usual(LENGTHS),
-        obstacles=(),
-        workspace=replace(scene.workspace, clearance_cm=0.3),
-        task=replace(scene.task, start_rad=START, goal_rad=GOAL, start_cm=tips[0], goal_cm=tips[1]),
-        roadmap=replace(scene.roadmap, nodes=1500, cost="time"),
-    )
-
-
-SCENE = scene_of()
-ARM = Arm.from_spec(SCENE.arm)
-
-
-def quiet(_stage, _share):
-    pass
 
 
 @pytest.fixture(scope="module")
 def plan():
     return first_plan(SCENE, quiet)[1]
-
-
-class Outcome:
-    """One run on the emulated Uno, and what its arm really did."""
-
-    def __init__(self, arrivals, scene=SCENE):
-        first = first_plan(scene, quiet)
-        setup = ArmSetup(scene, first[1].segments.start_usteps)
-        with closing(open_transport("sim://", 250_000, setup)) as line:
-            self.result = run_live(scene, line, Listed(arrivals), quiet, perf_counter, first)
-            line.arm.settle(SETTLE_S)
-            self.record = line.arm.record()
-
-    def least_clearance_cm(self, encounter):
-        """Of the links' centre lines from the obstacle, from its appearing on, by the emulated arm's own angles."""
-        appeared = (self.result.began_s + encounter.at_s) * TICKS_HZ
-        poses = self.record.q_rad[self.record.ticks >= appeared]
-        obstacles = obstacle_set([shape_of(encounter.obstacle)])
-        return min(pose_clearance_cm(ARM, q, obstacles) for q in poses[::4])
-
-    def inside_at_once(self, encounter):
-        """Whether the obstacle appeared where the arm was."""
-        appeared = (self.result.began_s + encounter.at_s) * TICKS_HZ
-        pose = self.record.q_rad[np.searchsorted(self.record.ticks, appeared)]
-        return (
-            pose_clearance_cm(ARM, pose, obstacle_set([shape_of(encounter.obstacle)])) <= 0.5 * SCENE.arm.link_width_cm
-        )
-
-
-def tip_at(plan, share):
-    q_rad, *_ = plan.trajectory.sample(np.array([share * plan.trajectory.duration_s]))
-    return forward(ARM, q_rad)[0, -1]
-
-
-def circle(x, y, diameter):
-    return Obstacle("circle", (float(x), float(y)), float(diameter))
 
 
 def test_an_obstacle_far_from_the_rest_of_the_way_changes_nothing(plan):
@@ -175,10 +97,11 @@ def test_the_arm_rests_no_later_than_the_rule_says_and_not_much_sooner(plan, sha
 def test_random_obstacles_at_random_times(sized, plan, capsys):
     """No contact and no lost step, and the goal or a reason; the unavoidable ones are those that come too near.
 
-    Prints the time from notice to the new plan being certified.
+    Prints how many motions were left at speed, and the times from notice to the new plan being certified.
     """
     rng = np.random.default_rng(2)
-    verdicts, waits_ms, reached = [], [], 0
+    verdicts, reached, stops = [], 0, []
+    waits_ms = {"at speed": [], "at rest": []}
     for number in range(sized(3, 100)):
         share = float(rng.uniform(0.05, 0.9))
         near = tip_at(plan, min(1.0, share + float(rng.uniform(0.05, 0.6)))) + rng.normal(0.0, 3.0, 2)
@@ -187,7 +110,9 @@ def test_random_obstacles_at_random_times(sized, plan, capsys):
         (one,) = done.result.encounters
         verdicts.append(one.verdict)
         reached += done.result.reached
-        waits_ms += [new.notice_to_certified_ms for new in done.result.new_plans]
+        for new in done.result.new_plans:
+            waits_ms["at rest" if new.spliced_at_s is None else "at speed"].append(new.notice_to_certified_ms)
+        stops += [one.stopped_because] if one.stopped_because else []
         assert not any(done.record.lost_full_steps), (number, arrival)
         assert not done.record.broken_rules, (number, arrival)
         assert done.result.reached or done.result.reason, (number, arrival)
@@ -198,6 +123,9 @@ def test_random_obstacles_at_random_times(sized, plan, capsys):
     counts = {verdict: verdicts.count(verdict) for verdict in ("kept", "avoided", "unavoidable")}
     if len(verdicts) >= 100:
         assert min(counts.values()) > 0, counts
+        assert len(waits_ms["at speed"]) > 0.5 * counts["avoided"], stops
         with capsys.disabled():
-            middle, most = np.percentile(waits_ms, [50, 99])
-            print(f"\n{counts}, goal reached {reached}; notice to certified {middle:.0f} ms median, {most:.0f} ms p99")
+            print(f"\n{counts}, goal reached {reached}; left at speed {len(waits_ms['at speed'])}")
+            for how, values in waits_ms.items():
+                middle, most = np.percentile(values, [50, 99])
+                print(f"notice to certified, {how}: {middle:.0f} ms median, {most:.0f} ms p99")

@@ -58,9 +58,18 @@ def _print(told: dict[str, Any]) -> None:
     for one in told["encounters"]:
         console.print(
             f"{one['at_s']:.3f} s: {one['obstacle']}: {one['verdict']}; {one['closed_edges']} edges closed, "
-            f"{one['repair_ms']:.2f} ms",
+            f"{one['repair_ms']:.2f} ms" + (f"; stopped: {because}" if (because := one["stopped_because"]) else ""),
             highlight=False,
         )
     for one in told["new_plans"]:
-        console.print(f"at rest after {one['rest_s']:.3f} s, certified {one['plan_ms']:.0f} ms later", highlight=False)
+        console.print(_made(one), highlight=False)
     console.print("goal reached" if told["reached"] else f"stopped: {told['reason']}", highlight=False)
+
+
+def _made(new: dict[str, Any]) -> str:
+    """Say how a new plan came about."""
+    if new["spliced_at_s"] is None:
+        return f"at rest after {new['rest_s']:.3f} s, certified {new['plan_ms']:.0f} ms later"
+    return (
+        f"certified after {new['plan_ms']:.0f} ms; left the motion at {new['spliced_at_s']:.3f} s of it, without a stop"
+    )

@@ -24,6 +24,7 @@ class Packer:
 
     Attributes:
         sent: segments taken so far.
+        until: segments from this number on are kept back.
         payload_bytes: of the next message, once `next_message` has returned it.
     """
 
@@ -32,16 +33,32 @@ class Packer:
         self._session = session
         self._segments = tuple(segments)
         self._allowances = tuple(allowances) or (NO_ALLOWANCE,) * len(self._segments)
+        self.until = len(self._segments)
         self.payload_bytes = 0
         self._message: Segments | None = None
         self._looked_at_seq = -1
 
+    def keep_back(self, first: int) -> None:
+        """Hand out no segment from number `first` on.
+
+        Raises:
+            ValueError: it was taken.
+        """
+        if first < self.sent:
+            raise ValueError(f"segment {first} cannot be kept back: {self.sent} were taken")
+        self.until, self._message = first, None
+
+    def go_on_with(self, segments: Sequence[Segment], allowances: Sequence[Allowance]) -> None:
+        """Hand out these from now on; those that were taken are the same."""
+        self._segments, self._allowances = tuple(segments), tuple(allowances)
+        self.until, self._message = len(segments), None
+
     def next_message(self) -> Segments | None:
-        """Return the next segments, as many as one message may hold; None when all are taken."""
+        """Return the next segments, as many as one message may hold; None when all are taken or kept back."""
         if self._message is not None and self._looked_at_seq == self._session.next_seq:
             return self._message  # asked about at every pass: it is coded once
         stale = self._message is None or self._is_long(self._message)  # stuffing changes with the frame's number
-        if stale and self.sent < len(self._segments):
+        if stale and self.sent < self.until:
             self._message = self._pack()
             self.payload_bytes = encoded_bytes(self._message)
         self._looked_at_seq = self._session.next_seq
@@ -55,7 +72,7 @@ class Packer:
 
     def _pack(self) -> Segments:
         count, room_bytes = 0, SHARED_PAYLOAD_BYTES - HEAD_BYTES
-        for segment in self._segments[self.sent : self.sent + MESSAGE_SEGMENTS]:
+        for segment in self._segments[self.sent : min(self.until, self.sent + MESSAGE_SEGMENTS)]:
             room_bytes -= encoded_bytes(segment)
             if room_bytes < 0 and count:
                 break

@@ -9,7 +9,9 @@ for the next message.
 says when it is done. A hold that nobody here asked for, as a damaged byte may cause, is taken back.
 """
 
+from bisect import bisect_left
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from itertools import accumulate
 
 from planarm.errors import CertificateError, LinkError, StepsDifferError
@@ -17,7 +19,7 @@ from planarm.link.clock_sync import Span
 from planarm.link.margin import Margin, SeenLine, line_margin
 from planarm.link.packing import Packer
 from planarm.link.path_time import PathTime
-from planarm.link.plan_steps import PlanSteps
+from planarm.link.plan_steps import LOOK_AHEAD, PlanSteps
 from planarm.link.position import MissedStartError, executed_since, moved_usteps
 from planarm.link.session import Session
 from planarm.link.stream_values import AT_EASE, Joining, Phase, StreamOptions, StreamProgress, config_of
@@ -41,6 +43,7 @@ from planarm_wire.messages import (
     Status,
     Stop,
 )
+from planarm_wire.rates import Allowance
 from planarm_wire.steps import duration_ticks, is_last
 
 __all__ = ["AT_EASE", "PERCENT", "Joining", "Phase", "Stream", "StreamOptions", "StreamProgress", "config_of"]
@@ -55,6 +58,7 @@ class Stream:
 
     `advance` is to be called after every `session.receive` and when `deadline_s` has passed. It raises LinkError when
     the device does not do what it acknowledged, StepsDifferError when the ledger does not show the plan's steps.
+    Whoever steers a running motion says with `wake_s` when to be called again at the latest.
     """
 
     def __init__(
@@ -72,6 +76,7 @@ class Stream:
         self.ledger_before: Ledger | None = None
         self.cleared_fault = Fault.NONE
         self.started_s = 0.0
+        self.wake_s = float("inf")
         self.began_s: Span | None = None
         self.least_queued = len(segments)
         self.stopped = False
@@ -144,12 +149,36 @@ class Stream:
         self._stop_wanted = True
         self._orders.append(Stop(int(quick)))
 
+    def keep_back(self, first: int) -> None:
+        """Send no segment from number `first` on until `go_on_with` tells others; those before have been, or will be.
+
+        Where nothing comes in time the device slows down along its path and rests before that segment.
+        """
+        self._packer.keep_back(first)
+
+    def go_on_with(self, segments: Sequence[Segment], allowances: Sequence[Allowance]) -> None:
+        """Take another plan from here on: its segments that were sent are the same.
+
+        Raises:
+            CertificateError: it has other first segments, or does not end as a plan does.
+        """
+        _check_ends(segments)
+        sent = self.sent_segments
+        if tuple(segments[:sent]) != self._segments[:sent] or len(allowances) != len(segments):
+            raise CertificateError(f"a plan to go on with has other segments than the {sent} that were sent")
+        self._segments = tuple(segments)
+        self.steps = PlanSteps.of(segments)
+        self._ends_ticks = tuple(accumulate((duration_ticks(segment) for segment in segments), initial=0))
+        self._path_time = PathTime(self._segments, self._ends_ticks, self.steps)
+        self._options = replace(self._options, allowances=tuple(allowances))
+        self._packer.go_on_with(segments, allowances)
+
     @property
     def deadline_s(self) -> float:
         """When `advance` must be called at the latest."""
-        if self.phase is Phase.RUNNING and self._session.idle:
-            return min(self._poll_due_s(), self._stall_due_s())
-        return float("inf")
+        if self.phase is not Phase.RUNNING:
+            return float("inf")
+        return min(self.wake_s, self._poll_due_s(), self._stall_due_s()) if self._session.idle else self.wake_s
 
     def advance(self, now_s: float) -> None:
         """Do whatever is due."""
@@ -306,6 +335,8 @@ class Stream:
         while (message := self._packer.next_message()) is not None:
             if self._packer.payload_bytes > self._credit or not self._session.fits(message):
                 return
+            if self._wanted_from() > self._executed:
+                return
             self._session.send(message, now_s)
             self._packer.take()
 
@@ -313,6 +344,15 @@ class Stream:
     def _credit(self) -> int:
         """Payload bytes that the device's queue still takes."""
         return self._status.free_bytes - self._session.room_in_flight
+
+    def _wanted_from(self) -> int:
+        """Return how many segments have to be executed before the device is to have the next."""
+        if self._options.ahead_s is None or not self._options.allowances:
+            return 0
+        running = self._options.allowances[self._executed : self._executed + LOOK_AHEAD]
+        need_ticks = max((allowance.need_ticks for allowance in running), default=0.0)
+        ahead_ticks = need_ticks + self._options.ahead_s * TICKS_HZ
+        return bisect_left(self._ends_ticks, self._ends_ticks[self.sent_segments] - ahead_ticks)
 
     def _poll_due_s(self) -> float:
         """When the device can have room for the next message, or can have ended."""
@@ -325,6 +365,7 @@ class Stream:
             while wanted > 0 and until < len(self._segments):
                 wanted -= encoded_bytes(self._segments[until])
                 until += 1
+            until = max(until, self._wanted_from())
         wait_s = (self._ends_ticks[until] - self._ends_ticks[self._executed]) / TICKS_HZ
         wait_s *= PERCENT / max(1, min(self._status.rate_percent, self.path_clock_percent))
         return self._session.status_s + min(max(wait_s, MIN_POLL_S), MAX_POLL_S)

@@ -23,7 +23,8 @@ class StreamOptions:
     `start_stop_ticks` tell it from which interval on they may stop dead; a device whose drivers are enabled keeps what
     it was told before. `released_spread_usteps` is how far each joint can move by itself while the drivers are
     released; empty: any way. `start_at_s` is a time of the clock at which the first segment is due: START is given the
-    lead that is left until then, at least `lead_ticks`.
+    lead that is left until then, at least `lead_ticks`. `ahead_s` limits how much path the device is given beyond what
+    a stop takes, for motions whose rest may be changed on the way; without it the device's queue is filled.
     """
 
     lead_ticks: int = 160_000
@@ -32,6 +33,7 @@ class StreamOptions:
     start_stop_ticks: tuple[int, ...] = ()
     released_spread_usteps: tuple[int, ...] = ()
     start_at_s: float | None = None
+    ahead_s: float | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -5,53 +5,53 @@ moves it can touch and a repair of the search. When one appears, the rest of the
 the least path time at which the arm can be:
 
 - nothing of it comes too near: the stream is kept as it is;
-- something does, but later than the arm can come to rest: the arm slows down along its path, gently where there is
-  room, and rests; a new plan is made from there, certified among all obstacles, and streamed;
-- something does before that: the quickest stop, and the obstacle is reported as unavoidable.
+- something does, far enough ahead: no segment from a border before it on is sent, another motion that leaves this one
+  at that border is planned and certified beside the stream, and sent in the place of the rest
+  (`planarm.operations.splicing`); the arm does not stop, unless planning takes longer than it was given;
+- there is no such border or no such motion, but the arm can come to rest before: it slows down along its path, gently
+  where there is room, and rests; a new plan is made from there, certified among all obstacles, and streamed;
+- something comes too near before that: the quickest stop, and the obstacle is reported as unavoidable.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from concurrent.futures import Future
+from contextlib import closing
 from dataclasses import asdict, dataclass, field, replace
-from typing import Any, Literal, Protocol
+from functools import partial
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from planarm.errors import NoPathError, SceneError, TimingError
-from planarm.link.clock_sync import MOST_SLOWNESS
+from planarm.errors import CertificateError, NoPathError, SceneError, TimingError
+from planarm.link.clock import RealClock
 from planarm.link.exchange import stream_plan
 from planarm.link.position import StreamError, moved_usteps
 from planarm.link.stream import Stream
 from planarm.link.transport import Transport
 from planarm.model.arm import Arm
 from planarm.model.kinematics import forward
-from planarm.model.shapes import Circle, Polygon, obstacle_set, shape_of
+from planarm.model.shapes import shape_of
 from planarm.model.transmission import Transmission
+from planarm.operations.beside import AsLong, Beside, InThread
+from planarm.operations.splicing import Border, first_border, plan_from_border, why_not
+from planarm.operations.verdicts import Verdict, contact_time_s, judge_contact, whereabouts_s
 from planarm.pipeline import Notice, plan_scene, planning_margin_cm
 from planarm.plan import Plan
 from planarm.roadmap.planning import RoadmapTask, way_from
-from planarm.roadmap.recheck import first_contact
 from planarm.routes.route import route_through
 from planarm.scene import Obstacle, Scene
-from planarm.stepping.stopping import stops
 from planarm.streaming.plan_stream import options_for
-from planarm.trajectory.motion import Trajectory
 from planarm.workspace.joint_proof import joint_world
-from planarm_wire.messages import SLICE_TICKS, TICKS_HZ
-from planarm_wire.steps import duration_ticks
 
 Floats = NDArray[np.float64]
-Verdict = Literal["kept", "avoided", "unavoidable"]
-
-LOOK_S = 0.001
-"""The rest of a motion is looked at this densely, with a bound for what lies between."""
-ORDER_S = 0.03
-"""From a notice to a stop that takes effect: a message waits for at most one other on the line, 10 ms each."""
-GENTLE_SHARE = 0.5
-"""Of the allowed slowing that the device uses for a stop that is not a quick one."""
 MOST_LEGS = 20
+LOOK_AGAIN_S = 0.005
+"""So soon the sources of obstacles, and the work on another motion, are looked at again."""
+AHEAD_S = 0.1
+"""Path that the device holds beyond what a stop takes: what it holds cannot be changed any more."""
 
 
 class Obstacles(Protocol):
@@ -71,19 +71,24 @@ class Encounter:
     verdict: Verdict
     quick: bool
     """Whether the stop had to be a quick one, with all of the allowed slowing."""
-    closed_edges: int
-    repair_ms: float
+    closed_edges: int = 0
+    repair_ms: float = 0.0
     """Checking the moves that it can touch, and telling the search."""
+    stopped_because: str = ""
+    """Why the motion was not left at speed; empty where it was, or where nothing had to be done."""
 
 
 @dataclass(frozen=True, slots=True)
 class NewPlan:
-    """A plan that was made while the arm rested on its path."""
+    """A plan that was made on the way."""
 
     rest_s: float
-    """From the notice to rest, by the transport's clock."""
+    """From the notice to rest, by the transport's clock; 0 where the arm went on."""
     plan_ms: float
-    """From rest to the new plan being certified, by the host's clock."""
+    """From rest to the new plan being certified, by the host's clock; where the arm went on, from the notice, by the
+    transport's."""
+    spliced_at_s: float | None = None
+    """The path time at which the motion was left for the new one at speed; None where the arm rested."""
 
     @property
     def notice_to_certified_ms(self) -> float:
@@ -121,48 +126,142 @@ class LiveResult:
 
 
 @dataclass
+class _Splice:
+    """A motion that is to be left, and the work on the one that follows."""
+
+    border: Border
+    contact_s: float
+    """Path time at which the old motion would meet an obstacle."""
+    noticed_s: float
+    work: Future[Plan]
+    stale: bool = False
+    """Another obstacle has come since the work began."""
+
+
+@dataclass
 class _Run:
     """What one live run knows, from leg to leg."""
 
     scene: Scene
     task: RoadmapTask
+    plan: Plan
+    """What streams."""
     obstacles: Obstacles
     transport: Transport
     host_s: Callable[[], float]
+    beside: Beside
     margin_cm: float
     began_s: float | None = None
     noticed_s: float = 0.0
     stopping: Verdict | None = None
+    splice: _Splice | None = None
+    untold: list[int] = field(default_factory=list)
+    """Encounters whose obstacles the roadmap does not know yet."""
     encounters: list[Encounter] = field(default_factory=list)
+    plans: list[Plan] = field(default_factory=list)
+    new_plans: list[NewPlan] = field(default_factory=list)
 
     def begin_leg(self) -> None:
         """Forget what stopped the leg before."""
         self.stopping = None
 
-    def watch(self, plan: Plan, stream: Stream) -> None:
+    def watch(self, stream: Stream) -> None:
         """Look for new obstacles and answer them; called while the stream runs."""
         now_s = self.transport.clock.now_s()
         if self.began_s is None:
             self.began_s = stream.started_s
         for obstacle in self.obstacles.new(now_s - self.began_s):
-            self._meet(plan, stream, obstacle, now_s)
+            self._meet(stream, obstacle, now_s)
+        if self.splice is not None and self.stopping is None and self.beside.has_ended(self.splice.work, now_s):
+            self._end_splice(stream, self.splice, now_s)
+        stream.wake_s = now_s + LOOK_AGAIN_S
 
-    def _meet(self, plan: Plan, stream: Stream, obstacle: Obstacle, now_s: float) -> None:
-        shape = shape_of(obstacle)
-        least_s, most_s = whereabouts_s(plan, stream, now_s)
-        verdict, quick = judge(plan, shape, self.margin_cm, least_s, most_s)
-        began_s = self.host_s()
-        _, changes = self.task.roadmap.add_obstacle(shape)
-        self.task.planner.change(changes)
-        repair_ms = 1e3 * (self.host_s() - began_s)
+    def take(self, plan: Plan, new: NewPlan) -> None:
+        """Go on with a new plan."""
+        self.plan = plan
+        self.plans.append(plan)
+        self.new_plans.append(new)
+
+    def rest(self) -> None:
+        """Wait for work that nobody wants any more, and let the roadmap know all obstacles: the arm rests."""
+        if self.splice is not None:
+            self.splice.work.exception()
+            self.splice = None
+        self._tell_roadmap()
+
+    def _meet(self, stream: Stream, obstacle: Obstacle, now_s: float) -> None:
+        least_s, most_s = whereabouts_s(self.plan, stream, now_s)
+        contact_s = contact_time_s(self.plan, shape_of(obstacle), self.margin_cm, least_s)
+        verdict, quick = judge_contact(self.plan, contact_s, most_s)
+        self.untold.append(len(self.encounters))
+        self.encounters.append(Encounter(obstacle, now_s - (self.began_s or now_s), verdict, quick))
         self.scene = replace(self.scene, obstacles=(*self.scene.obstacles, obstacle))
-        at_s = now_s - (self.began_s or now_s)
-        self.encounters.append(Encounter(obstacle, at_s, verdict, quick, len(changes.edges), repair_ms))
-        if verdict != "kept" and self.stopping is None:
-            self.noticed_s = now_s
-            stream.stop(quick=quick)
-        if verdict != "kept" and self.stopping != "unavoidable":
-            self.stopping = verdict
+        if self.splice is None:
+            self._tell_roadmap()
+        else:
+            self.splice.stale = True
+        if verdict == "kept":
+            return
+        if self.stopping is not None:
+            self.stopping = "unavoidable" if verdict == "unavoidable" else self.stopping
+            return
+        because = "" if verdict == "unavoidable" else self._leave(stream, contact_s, least_s, most_s, now_s)
+        if because or verdict == "unavoidable":
+            self._stop(stream, verdict, quick, because, now_s)
+
+    def _leave(self, stream: Stream, contact_s: float, least_s: float, most_s: float, now_s: float) -> str:
+        """Begin to leave the motion at speed; return why not, empty when it is begun."""
+        if self.splice is not None:  # it is being left already
+            self.splice.contact_s = min(self.splice.contact_s, contact_s)
+            return "" if contact_s > self.splice.border.path_s else "it is before where the motion is left"
+        if problem := why_not(self.plan):
+            return problem
+        ready_s = most_s + self.beside.allow_s(1e-3 * self.plans[-1].plan_ms)
+        border = first_border(self.plan, stream.sent_segments, ready_s)
+        if border is None:
+            return "too little of the motion is left"
+        if border.path_s >= contact_s:
+            return "it is before where the motion could be left"
+        stream.keep_back(border.segment)
+        self.splice = _Splice(border, contact_s, now_s, self._begin(border, least_s, now_s))
+        return ""
+
+    def _begin(self, border: Border, from_s: float, now_s: float) -> Future[Plan]:
+        """Begin to plan a motion that leaves the one that streams."""
+        work = partial(plan_from_border, self.scene, self.task, self.plan, border, from_s, self.margin_cm)
+        return self.beside.begin(work, now_s)
+
+    def _end_splice(self, stream: Stream, splice: _Splice, now_s: float) -> None:
+        """Take the motion that was planned, plan once more, or stop."""
+        least_s, most_s = whereabouts_s(self.plan, stream, now_s)
+        self.splice = None
+        self._tell_roadmap()
+        if splice.stale:
+            self.splice = replace(splice, work=self._begin(splice.border, least_s, now_s), stale=False)
+            return
+        try:
+            plan = splice.work.result()
+        except (NoPathError, SceneError, TimingError, CertificateError) as error:
+            _, quick = judge_contact(self.plan, splice.contact_s, most_s)
+            self._stop(stream, "avoided", quick, str(error), splice.noticed_s)
+            return
+        stream.go_on_with(plan.segments.segments, plan.segments.allowances)
+        self.take(plan, NewPlan(0.0, 1e3 * (now_s - splice.noticed_s), splice.border.path_s))
+
+    def _stop(self, stream: Stream, verdict: Verdict, quick: bool, because: str, noticed_s: float) -> None:
+        stream.stop(quick=quick)
+        self.stopping, self.noticed_s = verdict, noticed_s
+        self.encounters[-1] = replace(self.encounters[-1], stopped_because=because)
+
+    def _tell_roadmap(self) -> None:
+        """Let the roadmap and the search know the obstacles that they do not know; nobody else uses them meanwhile."""
+        for k in self.untold:
+            began_s = self.host_s()
+            _, changes = self.task.roadmap.add_obstacle(shape_of(self.encounters[k].obstacle))
+            self.task.planner.change(changes)
+            repair_ms = 1e3 * (self.host_s() - began_s)
+            self.encounters[k] = replace(self.encounters[k], closed_edges=len(changes.edges), repair_ms=repair_ms)
+        self.untold.clear()
 
 
 def run_live(
@@ -172,6 +271,7 @@ def run_live(
     notice: Notice,
     host_s: Callable[[], float],
     first: tuple[RoadmapTask, Plan] | None = None,
+    beside: Beside | None = None,
 ) -> LiveResult:
     """Carry a scene out on a board while obstacles may appear.
 
@@ -182,33 +282,36 @@ def run_live(
         notice: told the progress of planning.
         host_s: a clock of the host's.
         first: the roadmap and the plan, when they are there already (`first_plan`).
+        beside: plans while the arm moves; by default in a thread, or as long as that would take in an emulator's time.
 
     Raises:
         PlanarmError: the first plan cannot be made, or the line or the board fails.
     """
     task, plan = first or first_plan(scene, notice)
-    run = _Run(scene, task, obstacles, transport, host_s, planning_margin_cm(scene))
-    plans = [plan]
-    new_plans: list[NewPlan] = []
+    beside = beside or (InThread() if isinstance(transport.clock, RealClock) else AsLong(host_s))
+    run = _Run(scene, task, plan, obstacles, transport, host_s, beside, planning_margin_cm(scene), plans=[plan])
+    with closing(beside):
+        end_rad, reason = _legs(run, notice)
+    met, made, plans = tuple(run.encounters), tuple(run.new_plans), tuple(run.plans)
+    return LiveResult(not reason, reason, met, made, plans, end_rad, run.began_s or 0.0)
 
-    def ended(reason: str) -> LiveResult:
-        met, made, all_plans = tuple(run.encounters), tuple(new_plans), tuple(plans)
-        return LiveResult(not reason, reason, met, made, all_plans, end_rad, run.began_s or 0.0)
 
-    while len(plans) <= MOST_LEGS:
-        end_rad, stopped = _stream_leg(run, plan)
+def _legs(run: _Run, notice: Notice) -> tuple[Floats, str]:
+    """Stream from rest to rest until the goal is reached; return where the arm rests, and why it is not the goal."""
+    for _ in range(MOST_LEGS):
+        end_rad, stopped = _stream_leg(run)
+        run.rest()
         if stopped is None:
-            return ended("")
-        rest_s, planning_s = transport.clock.now_s() - run.noticed_s, host_s()
+            return end_rad, ""
+        rest_s, planning_s = run.transport.clock.now_s() - run.noticed_s, run.host_s()
         try:
-            plan = plan_from(run.scene, task, end_rad, notice)
+            plan = plan_from(run.scene, run.task, end_rad, notice)
         except (NoPathError, SceneError, TimingError) as error:
-            return ended(f"{stopped}: {error}")
-        plans.append(plan)
-        new_plans.append(NewPlan(rest_s, 1e3 * (host_s() - planning_s)))
+            return end_rad, f"{stopped}: {error}"
+        run.take(plan, NewPlan(rest_s, 1e3 * (run.host_s() - planning_s)))
         if not plan.certificate.ok:
-            return ended(f"the new plan is not certified: {plan.certificate.explain()}")
-    return ended(f"{MOST_LEGS} new plans were made and none could be finished")
+            return end_rad, f"the new plan is not certified: {plan.certificate.explain()}"
+    return end_rad, f"{MOST_LEGS} new plans were made from rest and none could be finished"
 
 
 def first_plan(scene: Scene, notice: Notice) -> tuple[RoadmapTask, Plan]:
@@ -240,79 +343,20 @@ def plan_from(scene: Scene, task: RoadmapTask, rest_rad: Floats, notice: Notice)
     return plan_scene(from_here, notice, route_through(from_here, margin_cm, poses, cost))
 
 
-def judge(plan: Plan, shape: Circle | Polygon, margin_cm: float, least_s: float, most_s: float) -> tuple[Verdict, bool]:
-    """Tell what a new obstacle means for a motion, and whether its stop has to be a quick one.
-
-    Args:
-        plan: the motion.
-        shape: the obstacle.
-        margin_cm: to keep from the links' centre lines.
-        least_s: the path time is now at least this,
-        most_s: and at most this.
-    """
-    contact_s = contact_time_s(plan, shape, margin_cm, least_s)
-    if contact_s == np.inf:
-        return "kept", False
-    if contact_s > rest_time_s(plan, most_s, GENTLE_SHARE):
-        return "avoided", False
-    return ("avoided" if contact_s > rest_time_s(plan, most_s, 1.0) else "unavoidable"), True
-
-
-def contact_time_s(plan: Plan, shape: Circle | Polygon, margin_cm: float, from_s: float) -> float:
-    """Return the first path time from `from_s` on at which a link may be nearer than that; infinite when none is."""
-    trajectory: Trajectory = plan.trajectory
-    t_s = np.linspace(
-        min(from_s, trajectory.duration_s), trajectory.duration_s, 2 + int(trajectory.duration_s / LOOK_S)
-    )
-    q_rad = np.ascontiguousarray(trajectory.sample(t_s)[0])
-    world = joint_world(plan.scene)
-    # Between two samples no joint turns farther than from one to the other and a little: both count half of it.
-    turns = np.abs(np.diff(q_rad, axis=0)) @ np.cumsum(world.lengths_cm[::-1])[::-1]
-    sway = np.zeros(len(t_s))
-    np.maximum(sway[:-1], turns, out=sway[:-1])
-    np.maximum(sway[1:], turns, out=sway[1:])
-    index = first_contact(world, obstacle_set([shape]), margin_cm, q_rad, sway)
-    return float(t_s[index]) if index >= 0 else float("inf")
-
-
-def rest_time_s(plan: Plan, from_s: float, share: float) -> float:
-    """Return a path time at which the arm rests at the latest when a stop is sent at `from_s`.
-
-    `share` of the allowed slowing is what the stop uses: 1 for a quick one, else `GENTLE_SHARE`.
-    """
-    segments = plan.segments
-    durations = [duration_ticks(segment) for segment in segments.segments]
-    starts_s, needs_s = stops(plan.trajectory, plan.scene, durations, segments.allowances, share)
-    ordered_s = from_s + ORDER_S
-    first = max(0, int(np.searchsorted(starts_s, from_s, side="right")) - 1)
-    last = int(np.searchsorted(starts_s, ordered_s, side="right")) + 1  # the slice that runs is ended as it was begun
-    return min(ordered_s + SLICE_TICKS / TICKS_HZ + float(needs_s[first:last].max()), sum(durations) / TICKS_HZ)
-
-
-def whereabouts_s(plan: Plan, stream: Stream, now_s: float) -> tuple[float, float]:
-    """Return the least and the largest path time of the arm: by the ledger, and by the fastest board's clock."""
-    segments = plan.segments.segments[: stream.executed_segments]
-    least_s = sum(map(duration_ticks, segments)) / TICKS_HZ
-    began_s = stream.began_s.least if stream.began_s else stream.started_s
-    return least_s, max(least_s, (now_s - began_s) * (1.0 + MOST_SLOWNESS))
-
-
-def _stream_leg(run: _Run, plan: Plan) -> tuple[Floats, Verdict | None]:
-    """Stream one plan until it is done or stopped; return where the arm rests, and the verdict that stopped it."""
+def _stream_leg(run: _Run) -> tuple[Floats, Verdict | None]:
+    """Stream the plan until it is done or stopped; return where the arm rests, and the verdict that stopped it."""
     run.begin_leg()
-    scene = plan.scene
-    options = options_for(scene, plan.segments)
+    plan = run.plan
+    options = replace(options_for(plan.scene, plan.segments), ahead_s=AHEAD_S)
     start = np.array(plan.segments.start_usteps)
     try:
-        result = stream_plan(
-            run.transport, plan.segments.segments, options=options, steer=lambda stream: run.watch(plan, stream)
-        )
+        result = stream_plan(run.transport, plan.segments.segments, options=options, steer=run.watch)
         moved = moved_usteps(result.ledger_before, result.ledger_after)
     except StreamError as error:
         if run.stopping is None:
             raise
         moved = error.position.moved_usteps
-    at: Floats = Transmission.of(scene).q_rad(start + np.array(moved))
+    at: Floats = Transmission.of(plan.scene).q_rad(start + np.array(moved))
     return at, run.stopping
 
 

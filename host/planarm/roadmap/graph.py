@@ -146,10 +146,9 @@ class Roadmap:
         margin = self.world.margin_cm + tolerance_cm
         obstacle = obstacle_set([shape])
         touched = touched_moves(self.world, obstacle, margin, self.poses_rad, self._ends_cm, self.pairs, moves)
-        self._blockers[touched] += 1
         self._added += 1
         self._blocked_by[self._added] = touched
-        edges = self._edges.there_and_back(touched[self._blockers[touched] == 1])
+        edges = block(self._blockers, self._edges.of_move, touched)
         return self._added, Changes(edges, np.full(len(edges), np.inf))
 
 
@@ -184,6 +183,18 @@ def _directed(nodes: int, pairs: Ints) -> tuple[Digraph, MoveEdges]:
     back = np.empty(len(order), np.int64)
     back[of_move.ravel()] = of_move[:, ::-1].ravel()
     return digraph(nodes, tails[order], heads[order], np.full(len(order), UNKNOWN)), MoveEdges(of_move, back)
+
+
+@kernel
+def block(blockers: Ints, of_move: Ints, moves: Ints) -> NDArray[np.int64]:
+    """Count one more blocker of each of these moves; return the directed edges of those that had none."""
+    edges, count = np.empty(2 * moves.shape[0], np.int64), 0
+    for m in moves:
+        blockers[m] += 1
+        if blockers[m] == 1:
+            edges[count], edges[count + 1] = of_move[m, 0], of_move[m, 1]
+            count += 2
+    return edges[:count]
 
 
 @kernel

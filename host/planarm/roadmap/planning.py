@@ -148,6 +148,36 @@ def way_from(task: RoadmapTask, world: JointWorld, pose_rad: Floats) -> tuple[Fl
     return None if best is None else (np.concatenate([pose_rad[None], best[1]]), best[0])
 
 
+def ways_on(task: RoadmapTask, world: JointWorld, poses_rad: Floats) -> list[tuple[float, int, Floats]]:
+    """Return ways to the goal that follow an old way for a while: from which of its configurations on, and how.
+
+    Args:
+        task: the roadmap with all obstacles that were added, and its planner.
+        world: the arm among all obstacles.
+        poses_rad: configurations on the old way, one after the other, shape (m, n); those that are no nodes are joined
+            with their nearest ones.
+
+    Returns:
+        (cost from the first configuration, number k of the one at which the old way is left, the configurations from
+        there to the goal), the cheapest first.
+    """
+    roadmap, found, along = task.roadmap, [], 0.0
+    for k, pose in enumerate(poses_rad):
+        if k:
+            along += edge_costs(roadmap.model, KINDS[roadmap.cost], poses_rad[k - 1], pose)[0]
+        nodes = np.flatnonzero((roadmap.poses_rad == pose).all(axis=1))
+        if not len(nodes):
+            way = way_from(task, world, pose)
+            if way is not None:
+                found.append((along + way[1], k, way[0]))
+            continue
+        task.planner.move_start(int(nodes[0]))
+        answer = task.planner.solve()
+        if len(answer.nodes):
+            found.append((along + answer.cost, k, roadmap.poses_rad[answer.nodes]))
+    return sorted(found, key=lambda one: one[0])
+
+
 def way_energy_j(roadmap: Roadmap, nodes: NDArray[np.int64]) -> Floats:
     """Return the energy consumed on a way by each joint, in joules, shape (n,), resting at every node."""
     poses = roadmap.poses_rad[nodes]

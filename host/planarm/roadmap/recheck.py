@@ -4,7 +4,8 @@ A configuration that the obstacle touches blocks all its moves, and where links 
 most moves that are blocked cost a look at their ends. Most that are not cost no more. With its heading turning by w_k
 while the move goes from 0 to 1, a point of link k has an acceleration of at most sum(l_i w_i^2) over the links up to k,
 so it leaves the straight line between where it is at the two ends by at most an eighth of that; and those lines lie in
-the hull of the link's four end points. What cannot be told by that is halved as in `moves.move_is_free`.
+the hull of the link's four end points. What cannot be told by that is halved, among polygons as in
+`moves.move_is_free`.
 """
 
 from math import sqrt
@@ -19,6 +20,9 @@ from planarm.roadmap.moves import fill_full
 from planarm.workspace.joint_proof import SMALLEST_CM, JointWorld, link_ends
 from planarm.workspace.proof import next_piece
 from planarm_wire.kernel_cache import bare_kernel, kernel
+
+MOST_HALVINGS = 20
+"""Of a move before it counts as touched: it then comes within a millionth of its sag."""
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -59,19 +63,28 @@ def touched_moves(
     x, y, radius = obstacle.centers_cm[0, 0], obstacle.centers_cm[0, 1], obstacle.radii_cm[0]
     vertices = obstacle.vertices_cm
     out, apart = np.empty(which.shape[0], np.int64), np.full(poses_rad.shape[0], -1.0)
-    full, ends = np.empty(joints), np.empty((joints + 1, 2))
-    ends[0, 0], ends[0, 1] = world.base_x_cm, world.base_y_cm
+    full, ends = np.empty(joints), np.empty((2 + MOST_HALVINGS, joints + 1, 2))
+    ends[:, 0, 0], ends[:, 0, 1] = world.base_x_cm, world.base_y_cm
+    until = np.empty(1 + MOST_HALVINGS)
     for k in range(which.shape[0]):
         i, j = pairs[which[k], 0], pairs[which[k], 1]
-        for node in (i, j):
-            if apart[node] < 0.0:
-                apart[node] = chain_distance(ends_cm[node], x, y, radius, vertices, margin_cm)
-        touched = apart[i] <= margin_cm or apart[j] <= margin_cm
+        if apart[i] < 0.0:
+            apart[i] = chain_distance(ends_cm[i], x, y, radius, vertices, margin_cm)
+        touched = apart[i] <= margin_cm
+        if not touched:
+            if apart[j] < 0.0:
+                apart[j] = chain_distance(ends_cm[j], x, y, radius, vertices, margin_cm)
+            touched = apart[j] <= margin_cm
         if not touched and not _sweeps_clear(
-            lengths, poses_rad[i], poses_rad[j], ends_cm[i], ends_cm[j], x, y, radius + margin_cm
+            lengths, poses_rad[i], poses_rad[j], 1.0, ends_cm[i], ends_cm[j], x, y, radius + margin_cm
         ):
-            fill_full(lengths, poses_rad[i], poses_rad[j], full)
-            touched = not _is_clear(lengths, poses_rad[i], poses_rad[j], full, ends, x, y, radius, vertices, margin_cm)
+            a, b = poses_rad[i], poses_rad[j]
+            if vertices.shape[0] == 0:
+                ends[0], ends[1] = ends_cm[i], ends_cm[j]
+                touched = not _keeps_clear(lengths, a, b, until, ends, x, y, radius + margin_cm)
+            else:
+                fill_full(lengths, a, b, full)
+                touched = not _is_clear(lengths, a, b, full, ends[0], x, y, radius, vertices, margin_cm)
         if touched:
             out[found] = which[k]
             found += 1
@@ -94,6 +107,41 @@ def first_contact(
         if chain_distance(ends, x, y, radius, obstacle.vertices_cm, enough) <= enough:
             return i
     return -1
+
+
+@bare_kernel
+def _keeps_clear(
+    lengths: Floats, a: Floats, b: Floats, until: Floats, ends: Floats, x: float, y: float, distance: float
+) -> bool:
+    """Tell whether the straight move from a to b is proved to keep farther than that from a point.
+
+    Pieces whose hull is not far enough are halved: the sag falls with the square of a piece's share, so few are. Room
+    to work in: `until`, shape (1 + MOST_HALVINGS,), and `ends`, shape (2 + MOST_HALVINGS, joints + 1, 2), which holds
+    the links' ends at a, then at b.
+    """
+    joints, at, depth = a.shape[0], 0.0, 0
+    until[0] = 1.0
+    while depth >= 0:
+        left, right = ends[0], ends[1 + depth]
+        if _sweeps_clear(lengths, a, b, until[depth] - at, left, right, x, y, distance):
+            at = until[depth]
+            for k in range(1, joints + 1):
+                left[k, 0], left[k, 1] = right[k, 0], right[k, 1]
+            depth -= 1
+            continue
+        if depth == MOST_HALVINGS:
+            return False
+        middle, heading = 0.5 * (at + until[depth]), 0.0
+        depth += 1
+        until[depth], between = middle, ends[1 + depth]
+        for k in range(joints):
+            heading += a[k] + middle * (b[k] - a[k])
+            between[k + 1, 0] = between[k, 0] + lengths[k] * np.cos(heading)
+            between[k + 1, 1] = between[k, 1] + lengths[k] * np.sin(heading)
+            ax, ay, bx, by = between[k, 0], between[k, 1], between[k + 1, 0], between[k + 1, 1]
+            if point_segment_distance2(x, y, ax, ay, bx, by) <= distance * distance:
+                return False
+    return True
 
 
 @bare_kernel
@@ -136,12 +184,20 @@ def _is_clear(
 
 @bare_kernel
 def _sweeps_clear(
-    lengths: Floats, a: Floats, b: Floats, a_ends: Floats, b_ends: Floats, x: float, y: float, distance: float
+    lengths: Floats,
+    a: Floats,
+    b: Floats,
+    share: float,
+    a_ends: Floats,
+    b_ends: Floats,
+    x: float,
+    y: float,
+    distance: float,
 ) -> bool:
-    """Tell whether the straight move from a to b surely keeps farther than that from a point."""
+    """Tell whether a share of a move from a to b, between links with these ends, surely keeps farther from a point."""
     turned, sag = 0.0, 0.0
     for k in range(a.shape[0]):
-        turned += b[k] - a[k]
+        turned += share * (b[k] - a[k])
         sag += 0.125 * lengths[k] * turned * turned
         if not _hull_is_far(a_ends, b_ends, k, x, y, distance + sag + ROUNDING_CM):
             return False

@@ -5,7 +5,7 @@ joint space, so such a path may run through full stretch and full fold.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -61,6 +61,28 @@ def joined(splines: Sequence[JointSpline]) -> JointSpline:
         np.concatenate([spline.coefficients for spline in splines]),
         np.unique(np.concatenate([*stops, starts[1:-1]])),
     )
+
+
+def run_on(splines: Sequence[JointSpline]) -> JointSpline:
+    """Return one path through all of them, each of which ends where, and in the direction in which, the next begins."""
+    whole = joined(splines)
+    starts = np.cumsum([0.0, *(float(spline.borders_s[-1]) for spline in splines)])
+    stops = [start + spline.stops_s for start, spline in zip(starts, splines, strict=False)]
+    return replace(whole, stops_s=np.unique(np.concatenate(stops)))
+
+
+def part_of(spline: JointSpline, from_s: float, to_s: float) -> JointSpline:
+    """Return the part between two parameters, from < to; its own parameter begins at 0."""
+    borders = spline.borders_s
+    inner = borders[(borders > from_s) & (borders < to_s)]
+    cuts = np.concatenate([[from_s], inner, [to_s]])
+    pieces = np.clip(np.searchsorted(borders, cuts[:-1], side="right") - 1, 0, len(borders) - 2)
+    x = (cuts[:-1] - borders[pieces])[:, None]
+    a, b, c, d = np.moveaxis(spline.coefficients[pieces], 1, 0)
+    # About x in place of the piece's start; where a piece is whole, x is 0 and nothing changes.
+    shifted = np.stack([a + x * (b + x * (c + x * d)), b + x * (2 * c + 3 * x * d), c + 3 * x * d, d], axis=1)
+    stops = spline.stops_s[(spline.stops_s > from_s) & (spline.stops_s < to_s)]
+    return JointSpline(spline.arm, cuts - from_s, np.ascontiguousarray(shifted), stops - from_s)
 
 
 @kernel

@@ -24,7 +24,9 @@ from planarm.trajectory.motion import Trajectory
 __all__ = ["Certificate", "Check", "certify"]
 
 
-def certify(scene: Scene, trajectory: Trajectory, train: StepTrain, plan: SegmentPlan) -> Certificate:
+def certify(
+    scene: Scene, trajectory: Trajectory, train: StepTrain, plan: SegmentPlan, from_ticks: int = 0
+) -> Certificate:
     """Return every check of the plan: steps, motion, and the arm in space.
 
     Args:
@@ -32,6 +34,8 @@ def certify(scene: Scene, trajectory: Trajectory, train: StepTrain, plan: Segmen
         trajectory: the timed motion.
         train: its steps.
         plan: the segments to be streamed; everything is held against what they expand to.
+        from_ticks: clearance from obstacles is looked at from here on: what was before is past, and was certified among
+            the obstacles of its time.
     """
     made = expand(plan)
     axes = motor_axes(scene.joints, scene.coupling)
@@ -47,5 +51,5 @@ def certify(scene: Scene, trajectory: Trajectory, train: StepTrain, plan: Segmen
         checks += check_torque(planned, scene)
         checks += check_stop(plan, table, planned, scene)
     checks += check_deviation(trajectory, scene, made, at)
-    checks += check_space(scene, made, at)
+    checks += check_space(scene, made, at, from_ticks)
     return Certificate(tuple(checks))

@@ -18,20 +18,23 @@ AMBER_BEND_RAD = np.radians(5.0)
 """An inner joint nearer than this to straight or folded is amber: there the tip cannot be moved in every direction."""
 
 
-def check_space(scene: Scene, made: StepTrain, at: MotorPositions) -> list[Check]:
+def check_space(scene: Scene, made: StepTrain, at: MotorPositions, from_ticks: int = 0) -> list[Check]:
     """Check clearance, joint limits, the distance from singular poses, and where the tip starts and ends.
 
     Args:
         scene: what was asked for.
         made: the expanded plan.
         at: the motors' positions around each of its steps.
+        from_ticks: clearance is looked at from here on.
     """
     transmission = Transmission.of(scene)
     poses = poses_of(scene.arm, transmission, made, at)
     checks = []
     if scene.obstacles:
         moving = scene.moving
-        checks.append(_check_clearance(scene, poses) if moving is None else check_moving(scene, moving, poses))
+        checks.append(
+            _check_clearance(scene, poses.since(from_ticks)) if moving is None else check_moving(scene, moving, poses)
+        )
     if scene.arm.floor:
         height: Floats = poses.positions_cm[:, 1:, 1].min(axis=1) - poses.reach_cm
         worst = int(np.argmin(height))

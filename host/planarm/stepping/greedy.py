@@ -33,21 +33,26 @@ FIRST_TICKS = 64
 
 
 @kernel
-def cut(windows: Windows, fast_ticks: int, duration_ticks: int) -> tuple[Ticks, Ticks]:
+def cut(
+    windows: Windows, made: Ticks, last: Ticks, begin: int, fast_ticks: int, duration_ticks: int
+) -> tuple[Ticks, Ticks]:
     """Return (ends, runs): the tick at which each segment ends, and its runs, shape (segments, joints, 4).
 
     By the invariant the last end is `duration_ticks`; the caller expands and checks it.
 
     Args:
         windows: the steps.
+        made: how many of its steps each joint has made before, shape (joints,).
+        last: when each made the last of them, NEVER where none; changed.
+        begin: the tick from which on to cut.
         fast_ticks: the longest segment where a motor is fast.
         duration_ticks: the motion's end, where the last segment ends.
     """
     joints = windows.least_interval.shape[0]
-    following, last = windows.first[:-1].copy(), np.full(joints, NEVER)
+    following = windows.first[:-1] + made
     ends, runs = np.zeros(64, np.int64), np.zeros((64, joints, 4), np.int64)
     # No literals go into the other kernels: each would be compiled a second time for them.
-    segments, begin, length = 0, int(np.int64(0)), int(np.int64(1))
+    segments, length = 0, int(np.int64(1))
     while 0 <= begin < duration_ticks:
         if segments == ends.shape[0]:
             ends, runs = np.concatenate((ends, ends)), np.concatenate((runs, runs))

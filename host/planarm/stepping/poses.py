@@ -1,7 +1,7 @@
 """Every pose that an expanded plan takes, in the order of time, for the checks of the arm in space."""
 
-from dataclasses import dataclass
-from typing import NamedTuple
+from dataclasses import dataclass, replace
+from typing import NamedTuple, Self
 
 import numpy as np
 
@@ -41,6 +41,17 @@ class Poses:
     q_rad: Floats
     positions_cm: Floats
     reach_cm: Floats
+
+    def since(self, ticks: int) -> Self:
+        """Return the poses from a tick on, and the one before it."""
+        part = slice(max(0, int(np.searchsorted(self.ticks, ticks)) - 1), None)
+        return replace(
+            self,
+            ticks=self.ticks[part],
+            q_rad=self.q_rad[part],
+            positions_cm=self.positions_cm[part],
+            reach_cm=self.reach_cm[part],
+        )
 
     def place(self, i: int) -> str:
         """Say when and where the i-th pose is."""

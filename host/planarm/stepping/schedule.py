@@ -1,22 +1,28 @@
 """From a path to segments: time it, make its steps, compress them, and slow it down until a stop fits everywhere."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
+import numpy as np
+
+from planarm.errors import TimingError
 from planarm.model.transmission import motor_axes
 from planarm.scene import Scene
 from planarm.stepping.plan import SegmentPlan
 from planarm.stepping.quantise import quantise
-from planarm.stepping.segments import Coding, compress
+from planarm.stepping.segments import Coding, compress, expand
 from planarm.stepping.slowing import SpeedLimit, missing_road_ticks, slower
 from planarm.stepping.stopping import allowances
-from planarm.stepping.train import StepTrain
+from planarm.stepping.train import JointSteps, StepTrain
 from planarm.trajectory.motion import Trajectory
 
 MOST_ROUNDS = 16
 
 TIGHTER = 0.9
 """What the device holds is known once the segments are made; if they hold less, a little less is taken for it."""
+
+SAME_TICKS = 32
+"""Two motions that part at a border may make a step before it, or one that was taken across it, so much apart."""
 
 Timing = Callable[[SpeedLimit | None], Trajectory]
 
@@ -47,6 +53,55 @@ def schedule(scene: Scene, timing: Timing) -> tuple[Trajectory, StepTrain, Segme
         TimingError: a joint would have to step faster than the firmware can.
     """
     coding = Coding.of(motor_axes(scene.joints, scene.coupling))
+    return _until_stops_fit(scene, timing, lambda trajectory: encode(scene, trajectory, coding), 0)
+
+
+def go_on(
+    scene: Scene, timing: Timing, before: tuple[StepTrain, SegmentPlan], kept: int
+) -> tuple[Trajectory, StepTrain, SegmentPlan]:
+    """Do what `schedule` does for a motion whose first `kept` segments, and their allowances, are those of another.
+
+    Args:
+        scene: the joints, their motors and limits.
+        timing: times the motion, which is the other up to the border, under a further limit of the speed after it.
+        before: the other motion's steps and segments.
+        kept: how many segments stay.
+
+    Raises:
+        TimingError: a joint would have to step faster than the firmware can; or the motions differ before the border.
+    """
+    coding = Coding.of(motor_axes(scene.joints, scene.coupling))
+    old, segments, told = before[0], before[1].segments[:kept], before[1].allowances[:kept]
+    made = [len(joint.ticks) for joint in expand(SegmentPlan(segments, 0, old.start_usteps)).steps]
+
+    def encoded(trajectory: Trajectory) -> tuple[StepTrain, SegmentPlan]:
+        train = with_first_steps(old, made, quantise(trajectory, scene.joints, scene.coupling))
+        plan = compress(train, coding, kept=segments)
+        durations = [segment.duration_flags >> 1 for segment in plan.segments]
+        return train, replace(plan, allowances=(*told, *allowances(trajectory, scene, durations)[kept:]))
+
+    return _until_stops_fit(scene, timing, encoded, kept)
+
+
+def with_first_steps(old: StepTrain, made: Sequence[int], new: StepTrain) -> StepTrain:
+    """Return a train whose joints' first steps, so many of each, are an old one's to the tick.
+
+    Raises:
+        TimingError: they are other steps, or not at the same time but for rounding.
+    """
+    steps = []
+    for number, (count, first, rest) in enumerate(zip(made, old.steps, new.steps, strict=True), start=1):
+        same = len(rest.ticks) >= count and (first.directions[:count] == rest.directions[:count]).all()
+        if not same or (count and np.abs(first.ticks[:count] - rest.ticks[:count]).max() > SAME_TICKS):
+            raise TimingError(f"joint {number} makes other steps than before on the part of a motion that stays")
+        steps.append(JointSteps(np.concatenate([first.ticks[:count], rest.ticks[count:]]), rest.directions))
+    return StepTrain(old.start_usteps, tuple(steps), new.duration_ticks)
+
+
+def _until_stops_fit(
+    scene: Scene, timing: Timing, encoded: Callable[[Trajectory], tuple[StepTrain, SegmentPlan]], first: int
+) -> tuple[Trajectory, StepTrain, SegmentPlan]:
+    """Time and encode, slower until the device holds the path of every stop from segment `first` on."""
     limit: SpeedLimit | None = None
     road_ticks: float | None = None
     for left in range(MOST_ROUNDS, 0, -1):
@@ -55,8 +110,8 @@ def schedule(scene: Scene, timing: Timing) -> tuple[Trajectory, StepTrain, Segme
         if lower is not None:
             limit = lower
             continue
-        train, plan = encode(scene, trajectory, coding)
-        missing = missing_road_ticks(plan)
+        train, plan = encoded(trajectory)
+        missing = missing_road_ticks(plan, first)
         if missing is None:
             return trajectory, train, plan
         road_ticks = missing if road_ticks is None else TIGHTER * road_ticks

@@ -7,7 +7,7 @@ import numpy as np
 
 from planarm.errors import TimingError
 from planarm.stepping.expand import expand
-from planarm.stepping.greedy import ADD, COUNT, FIRST, INTERVAL, cut
+from planarm.stepping.greedy import ADD, COUNT, FIRST, INTERVAL, NEVER, cut
 from planarm.stepping.plan import SegmentPlan
 from planarm.stepping.train import StepTrain, Ticks, require_steppable
 from planarm.stepping.windows import EXACT_TO_1_US, Coding, tolerance_ticks, windows_of
@@ -17,11 +17,17 @@ from planarm_wire.wirings import board_of
 __all__ = ["Coding", "SegmentPlan", "compress", "expand"]
 
 
-def compress(train: StepTrain, coding: Coding = EXACT_TO_1_US, latest_ticks: Sequence[int] = ()) -> SegmentPlan:
+def compress(
+    train: StepTrain,
+    coding: Coding = EXACT_TO_1_US,
+    latest_ticks: Sequence[int] = (),
+    kept: Sequence[Segment] = (),
+) -> SegmentPlan:
     """Return segments that make the train's steps: counts and directions exactly, times within their tolerance.
 
     The tolerance is `planarm.stepping.windows.tolerance_ticks`; no interval gets shorter than the train's shortest.
-    `latest_ticks`, where given, tells of each joint how late its last step may be: what follows may be near.
+    `latest_ticks`, where given, tells of each joint how late its last step may be: what follows may be near. `kept`
+    are the first segments, which make the train's first steps and stay as they are.
 
     Raises:
         TimingError: steps are too close to each other for the firmware.
@@ -30,25 +36,30 @@ def compress(train: StepTrain, coding: Coding = EXACT_TO_1_US, latest_ticks: Seq
     if train.duration_ticks == 0:
         return SegmentPlan((), 0, train.start_usteps)
     windows = windows_of(train, coding, latest_ticks)
-    ends, runs = cut(windows, coding.fast_ticks, train.duration_ticks)
-    plan = SegmentPlan(_segments(train, ends, runs), train.duration_ticks, train.start_usteps)
+    before = expand(SegmentPlan(tuple(kept), 0, train.start_usteps))
+    made = np.array([len(joint.ticks) for joint in before.steps], np.int64)
+    last = np.array([joint.ticks[-1] if len(joint.ticks) else NEVER for joint in before.steps], np.int64)
+    begin = before.duration_ticks
+    ends, runs = cut(windows, made, last, begin, coding.fast_ticks, train.duration_ticks)
+    segments = (*kept, *_segments(train, made.tolist(), [begin, *ends.tolist()], runs))
+    plan = SegmentPlan(segments, train.duration_ticks, train.start_usteps)
     _require_same_steps(train, expand(plan), coding)
     return plan
 
 
-def _segments(train: StepTrain, ends: Ticks, runs: Ticks) -> tuple[Segment, ...]:
+def _segments(train: StepTrain, made: Sequence[int], borders: Sequence[int], runs: Ticks) -> tuple[Segment, ...]:
     """Return the wire's form of the runs; a run's direction is that of its first step in the train."""
-    following = [0] * len(train.steps)
+    following = list(made)
     resting = (Move(0),) * (board_of(len(train.steps)).joints - len(train.steps))
     segments = []
-    for k, (begin, end) in enumerate(pairwise([0, *ends.tolist()])):
+    for k, (begin, end) in enumerate(pairwise(borders)):
         moves = []
         for j, run in enumerate(runs[k].tolist()):
             count = run[COUNT]
             positive = count > 0 and train.steps[j].directions[following[j]] > 0
             moves.append(Move(2 * count + int(positive), run[FIRST], run[INTERVAL] >> 8, run[ADD]))
             following[j] += count
-        is_last = k == len(ends) - 1
+        is_last = k == len(runs) - 1
         segments.append(Segment(2 * (end - begin) + int(is_last), (*moves, *resting)))
     return tuple(segments)
 

@@ -73,12 +73,16 @@ def last_slices(table: SegmentTable) -> Ticks:
     return np.asarray(table.starts[:-1] + (table.durations - 1) // lengths * lengths)
 
 
-def missing_road_ticks(plan: SegmentPlan) -> float | None:
-    """Return how much path the device holds where stops do not fit, on average; None where all stops fit."""
+def missing_road_ticks(plan: SegmentPlan, first: int = 0) -> float | None:
+    """Return how much path the device holds where stops do not fit, on average; None where all stops fit.
+
+    Segments from number `first` on are looked at.
+    """
     if not plan.allowances:
         return None
     table = table_of(plan)
     lacking = shortfall_ticks(plan, table) > 0.0
+    lacking[:first] = False
     if not lacking.any():
         return None
     return float((held_until(table.starts, segment_bytes(table)) - last_slices(table))[lacking].mean())

@@ -65,6 +65,31 @@ class Trajectory:
         moving = ((wanted >= 0.0) & (wanted < self.duration_s))[:, None]
         return q, np.where(moving, dq * rate, 0.0), np.where(moving, dq * u + ddq * rate**2, 0.0)
 
+    def path_at(self, t_s: float) -> tuple[float, float]:
+        """Return the path parameter at a time within the motion, and its rate there."""
+        i = int(np.clip(np.searchsorted(self.t_s, t_s, side="right") - 1, 0, len(self.t_s) - 2))
+        u, since = float(self.s_ddot[i]), t_s - float(self.t_s[i])
+        s = float(self.s[i]) + since * (float(self.s_dot[i]) + 0.5 * u * since)
+        return min(max(s, float(self.s[i])), float(self.s[i + 1])), max(0.0, float(self.s_dot[i]) + u * since)
+
+    def left_for(self, path: SmoothPath, t_s: float, then: "Trajectory") -> "Trajectory":
+        """Return this motion up to a time, and from there on another, which begins with the rate that this one has.
+
+        Args:
+            path: this motion's up to there, then the other's; its parameter is this motion's.
+            t_s: when it is left.
+            then: the other motion, its time and path parameter from 0.
+        """
+        s, _ = self.path_at(t_s)
+        kept = (self.t_s < t_s) & (self.s < s)
+        return Trajectory(
+            path,
+            np.concatenate([self.t_s[kept], t_s + then.t_s]),
+            np.concatenate([self.s[kept], s + then.s]),
+            np.concatenate([self.s_dot[kept], then.s_dot]),
+            np.concatenate([self.q_rad[kept], then.q_rad]),
+        )
+
     def time_at(self, s: Floats) -> Floats:
         """Return the times in seconds at which the path parameters of shape (n,) are passed."""
         if len(self.t_s) == 1:

@@ -41,6 +41,13 @@ tightened where it exceeds a limit; from SLOW_BELOW on, or after ROUNDS, the who
 GROWTH = 2.0
 """How many times the squared path speed of a solution the next may have while torque limits it."""
 
+START_SLACK = 0.02
+"""Share of the squared rate at a motion's start by which a grid may be too coarse to have it; refinement settles it."""
+
+MOST_BEYOND = 1.0 + 5e-5
+"""A motion that begins at speed is not run slower as a whole, so it may exceed what is planned with by this; limits are
+planned with to a ten-thousandth (`limits.HEADROOM`)."""
+
 SETTLED_SHARE = 1e-4
 """The torque's estimate is good enough when drawing it anew changes the duration by less than this share."""
 
@@ -70,32 +77,39 @@ def time_path(
 
 
 def fastest_motion(
-    path: SmoothPath, limits: Limits, speed_cap: SpeedCap | None = None, rounds: int = ROUNDS
+    path: SmoothPath,
+    limits: Limits,
+    speed_cap: SpeedCap | None = None,
+    rounds: int = ROUNDS,
+    start_rate: float = 0.0,
 ) -> Trajectory:
     """Return the fastest motion along the path within the limits; see `time_path`.
 
     With fewer rounds the answer comes sooner and keeps the limits just as well: what refinement would have removed is
     removed by running slower.
+
+    With `start_rate` the path is not begun at rest but at this ds/dt, and it is left as it is. Raises TimingError where
+    the motion cannot be slowed down in time for what follows, or refinement leaves a limit exceeded.
     """
     s = _first_gridpoints(path, limits.joints)
     if limits.load is not None:
         s = with_turning_points(path, s)
     if not np.ptp(path.evaluate(s).q_rad, axis=0).any():
         return Trajectory(path, np.zeros(1), s[:1], np.zeros(1), path.evaluate(s[:1]).q_rad)
-    grid, trajectory = _refined(path, Grid.on(path, s), replace(limits, load=None), speed_cap, rounds)
+    grid, trajectory = _refined(path, Grid.on(path, s), replace(limits, load=None), speed_cap, rounds, start_rate)
     if limits.load is None:
         return trajectory
     require_holding(path, grid, limits)
     if limit_use(trajectory, limits, grid.samples).torque.max() <= 1.0:
         return trajectory  # the fastest without the torque's limit keeps it
-    return _refined(path, replace(grid, tangent_x=trajectory.s_dot**2), limits, speed_cap, rounds)[1]
+    return _refined(path, replace(grid, tangent_x=trajectory.s_dot**2), limits, speed_cap, rounds, start_rate)[1]
 
 
 def _refined(
-    path: SmoothPath, grid: Grid, limits: Limits, speed_cap: SpeedCap | None, rounds: int
+    path: SmoothPath, grid: Grid, limits: Limits, speed_cap: SpeedCap | None, rounds: int, start_rate: float
 ) -> tuple[Grid, Trajectory]:
     """Solve, look, refine and solve again; return the last grid, and the motion made to keep every limit."""
-    trajectory = solve(path, grid, limits, speed_cap)
+    trajectory = solve(path, grid, limits, speed_cap, start_rate)
     before_s, use = np.inf, limit_use(trajectory, limits, grid.samples)
     for _ in range(rounds):
         coarse = _coarse(trajectory, use)
@@ -105,9 +119,15 @@ def _refined(
             break
         before_s = trajectory.duration_s
         grid = _refine(grid, trajectory, use, coarse, np.inf if limits.load is None else GROWTH)
-        trajectory = solve(path, grid, limits, speed_cap)
+        trajectory = solve(path, grid, limits, speed_cap, start_rate)
         use = limit_use(trajectory, limits, grid.samples)
-    return grid, _slowed(trajectory, _slowing(use))
+    factor = _slowing(use)
+    if start_rate == 0.0:
+        return grid, _slowed(trajectory, factor)
+    if factor > MOST_BEYOND:
+        place = path.place(float(grid.s[int(np.argmax(_most(use)))]))
+        raise TimingError(f"a motion that begins at speed cannot keep the joints' limits at {place}")
+    return grid, trajectory
 
 
 def _first_gridpoints(path: SmoothPath, joints: int) -> Floats:
@@ -143,11 +163,14 @@ def _finite_angles(path: SmoothPath, s: Floats, joints: int) -> Floats:
     return path.evaluate(s).q_rad
 
 
-def solve(path: SmoothPath, grid: Grid, limits: Limits, speed_cap: SpeedCap | None = None) -> Trajectory:
+def solve(
+    path: SmoothPath, grid: Grid, limits: Limits, speed_cap: SpeedCap | None = None, start_rate: float = 0.0
+) -> Trajectory:
     """Return the fastest motion on the grid, held to the limits at both ends of every interval.
 
     Raises:
-        TimingError: a motor cannot hold the arm, or nothing moves in some interval.
+        TimingError: a motor cannot hold the arm, or nothing moves in some interval; or the motion begins at a rate from
+            which it cannot be slowed down in time.
     """
     s = grid.s
     ends = path_ends(grid.samples, limits)
@@ -155,7 +178,14 @@ def solve(path: SmoothPath, grid: Grid, limits: Limits, speed_cap: SpeedCap | No
     x_limits = squared_limits(ends, grid, limits, np.concatenate([[0], rest, [len(s) - 1]]))
     if speed_cap is not None:
         x_limits = np.minimum(x_limits, speed_cap(s) ** 2)
+    x_limits[0] = start_rate**2
     x = fastest_squared_speeds(*half_planes(ends, grid, limits, x_limits), x_limits)
+    if x[0] < x_limits[0] * (1.0 - START_SLACK):
+        raise TimingError(
+            f"a motion at the rate {start_rate:.6g}/s at {path.place(float(s[0]))} cannot be slowed down in time for "
+            f"what follows; {np.sqrt(x[0]):.6g}/s could"
+        )
+    x[0] = x_limits[0]
     s_dot = np.sqrt(x)
     stuck = np.flatnonzero(s_dot[:-1] + s_dot[1:] <= 0.0)
     if len(stuck):
@@ -172,9 +202,14 @@ def _coarse(trajectory: Trajectory, use: LimitUse) -> NDArray[np.bool_]:
     its acceleration is constant; it loses at most the unused share of its time.
     """
     lost_s = use.slack * np.diff(trajectory.t_s)
-    most = np.maximum(np.maximum(use.speed, use.acceleration), use.torque).max(axis=1)
+    most = _most(use)
     coarse = (most > SPLIT_ABOVE) | (lost_s > LOST_SHARE * trajectory.duration_s)
     return coarse if len(coarse) + np.count_nonzero(coarse) <= MAX_INTERVALS else np.zeros(len(coarse), np.bool_)
+
+
+def _most(use: LimitUse) -> Floats:
+    """Return the largest use of any limit inside each interval."""
+    return np.asarray(np.maximum(np.maximum(use.speed, use.acceleration), use.torque).max(axis=1))
 
 
 def _refine(grid: Grid, trajectory: Trajectory, use: LimitUse, coarse: NDArray[np.bool_], growth: float) -> Grid:

@@ -1,0 +1,93 @@
+"""Work beside a stream: something is computed while a loop goes on that must not wait for it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from concurrent.futures import Future, ThreadPoolExecutor
+from typing import Protocol, TypeVar
+
+from planarm.errors import PlanarmError
+
+T = TypeVar("T")
+
+ALLOWED = 2.0
+"""How many times as long as before work beside a stream may take."""
+
+
+class Beside(Protocol):
+    """Does one piece of work after the other; times are those of the stream's clock."""
+
+    def allow_s(self, known_s: float) -> float:
+        """Return how long to allow for work like one that took `known_s`."""
+        ...
+
+    def begin(self, work: Callable[[], T], now_s: float) -> Future[T]:
+        """Begin; the work before has ended."""
+        ...
+
+    def has_ended(self, work: Future[T], now_s: float) -> bool:
+        """Tell whether its result can be asked for by now."""
+        ...
+
+    def close(self) -> None:
+        """Wait for what is under way."""
+        ...
+
+
+class InThread:
+    """In a thread of its own: for boards, whose time goes on meanwhile."""
+
+    def __init__(self) -> None:
+        self._pool = ThreadPoolExecutor(max_workers=1)
+
+    def allow_s(self, known_s: float) -> float:
+        """Return so many times as long: the stream goes on meanwhile."""
+        return ALLOWED * known_s
+
+    def begin(self, work: Callable[[], T], now_s: float) -> Future[T]:
+        """Begin."""
+        return self._pool.submit(work)
+
+    def has_ended(self, work: Future[T], now_s: float) -> bool:
+        """Tell whether it is done."""
+        return work.done()
+
+    def close(self) -> None:
+        """Wait for what is under way."""
+        self._pool.shutdown()
+
+
+class AsLong:
+    """At once, in a clock's time that stands still meanwhile; the result is held back as long as it would have taken.
+
+    So an emulated arm goes on moving while its next motion is planned, as a real one does.
+
+    Args:
+        host_s: a clock of the host's, by which the work is timed.
+        takes_s: what all work is said to take, where runs have to be the same each time.
+    """
+
+    def __init__(self, host_s: Callable[[], float], takes_s: float | None = None) -> None:
+        self._host_s, self._takes_s = host_s, takes_s
+        self._ends_s = 0.0
+
+    def allow_s(self, known_s: float) -> float:
+        """Return what it is said to take, or so many times as long."""
+        return ALLOWED * known_s if self._takes_s is None else self._takes_s
+
+    def begin(self, work: Callable[[], T], now_s: float) -> Future[T]:
+        """Do it."""
+        began_s, future = self._host_s(), Future[T]()
+        try:
+            future.set_result(work())
+        except PlanarmError as error:
+            future.set_exception(error)  # raised where the result is asked for
+        self._ends_s = now_s + (self._host_s() - began_s if self._takes_s is None else self._takes_s)
+        return future
+
+    def has_ended(self, work: Future[T], now_s: float) -> bool:
+        """Tell whether the time has come."""
+        return now_s >= self._ends_s
+
+    def close(self) -> None:
+        """Nothing is under way."""

@@ -1,0 +1,131 @@
+"""A motion is left for another at speed while the emulated arm runs: it goes on without a stop, step for step."""
+
+from time import perf_counter
+
+import numpy as np
+import pytest
+
+from live_runs import SCENE, Outcome, circle, quiet, tip_at
+from planarm.operations.beside import AsLong
+from planarm.operations.replanning import first_plan
+from planarm.scene.arrivals import Arrival
+from planarm.stepping.segments import expand
+from planarm_wire.messages import TICKS_HZ
+
+PLANNING_S = 0.08
+"""What planning is said to take: runs are the same each time."""
+PIN_TICKS = 64
+"""By how much a step at the pins may differ from its time."""
+
+
+def prompt():
+    return AsLong(perf_counter, PLANNING_S)
+
+
+@pytest.fixture(scope="module")
+def plan():
+    return first_plan(SCENE, quiet)[1]
+
+
+@pytest.mark.parametrize(("appears", "at"), [(0.1, 0.7), (0.2, 0.85), (0.3, 0.85)])
+def test_the_arm_goes_on_while_another_motion_is_planned(plan, appears, at):
+    """Every step at its certified time, so the path clock was never slowed; and the arm never rests in between."""
+    x, y = tip_at(plan, at)
+    done = Outcome([Arrival(appears * plan.trajectory.duration_s, circle(x, y, 2.0))], beside=prompt())
+    assert [(one.verdict, one.stopped_because) for one in done.result.encounters] == [("avoided", "")]
+    assert done.result.reached, done.result.reason
+    (new,) = done.spliced
+    assert new.notice_to_certified_ms == pytest.approx(1e3 * PLANNING_S, abs=10.0)
+    first, last = done.result.plans
+    kept = [
+        new.spliced_at_s * TICKS_HZ > np.cumsum([s.duration_flags >> 1 for s in p.segments.segments]) - 1
+        for p in (first, last)
+    ]
+    count = int(kept[0].sum())
+    assert 0 < count == kept[1].sum()
+    assert first.segments.segments[:count] == last.segments.segments[:count]
+    assert first.segments.segments != last.segments.segments[: len(first.segments.segments)]
+    assert last.certificate.ok and len(last.scene.obstacles) == 1
+    told = done.comparison()
+    assert told.agrees, told.explain()
+    assert told.max_timing_error_ticks <= PIN_TICKS
+    every = np.sort(np.concatenate([joint.ticks for joint in expand(last.segments).steps]))
+    assert done.longest_pause_s() == pytest.approx(np.diff(every).max() / TICKS_HZ, abs=PIN_TICKS / TICKS_HZ)
+    _, speeds, _ = last.trajectory.sample(np.linspace(0.02, last.trajectory.duration_s - 0.02, 4000))
+    assert np.abs(speeds).max(axis=1).min() > 0.05
+    assert done.result.end_rad == pytest.approx(np.array(SCENE.task.goal_rad), abs=1e-3)
+    assert not any(done.record.lost_full_steps)
+    done.require_clear()
+
+
+def test_planning_that_takes_too_long_lets_the_arm_rest_on_its_path_and_go_on(plan):
+    """The device holds nothing behind the border, so it rests before it by itself, and goes on when more comes."""
+    x, y = tip_at(plan, 0.85)
+    arrival = Arrival(0.2 * plan.trajectory.duration_s, circle(x, y, 2.0))
+
+    class Slow(AsLong):
+        def allow_s(self, _known_s):
+            return PLANNING_S
+
+    done = Outcome([arrival], beside=Slow(perf_counter, 1.5))
+    assert done.result.reached, done.result.reason
+    assert len(done.spliced) == 1
+    told = done.comparison()
+    assert told.agrees, told.explain()
+    assert done.longest_pause_s() > 0.5
+    assert not any(done.record.lost_full_steps)
+    done.require_clear()
+
+
+def test_where_nothing_leads_on_the_arm_stops_and_says_why(plan):
+    x, y = tip_at(plan, 1.0)
+    done = Outcome([Arrival(0.2 * plan.trajectory.duration_s, circle(x, y, 4.0))], beside=prompt())
+    (one,) = done.result.encounters
+    assert one.verdict == "avoided"
+    assert one.stopped_because
+    assert not done.result.reached
+    assert done.spliced == []
+    assert not any(done.record.lost_full_steps)
+    done.require_clear()
+
+
+def test_an_obstacle_before_the_border_is_stopped_for(plan):
+    x, y = tip_at(plan, 0.38)
+    done = Outcome([Arrival(0.2 * plan.trajectory.duration_s, circle(x, y, 1.0))], beside=prompt())
+    (one,) = done.result.encounters
+    assert (one.verdict, one.stopped_because) == ("avoided", "it is before where the motion could be left")
+    assert done.spliced == []
+    assert not any(done.record.lost_full_steps)
+    done.require_clear()
+
+
+def test_an_obstacle_that_comes_while_another_is_planned_around(plan):
+    """What is planned then is of no use; it is planned once more, among both."""
+    x, y = tip_at(plan, 0.9)
+    at_s = 0.2 * plan.trajectory.duration_s
+    done = Outcome([Arrival(at_s, circle(x, y, 1.0)), Arrival(at_s + 0.04, circle(0.0, -35.0, 4.0))], beside=prompt())
+    assert len(done.result.encounters) == 2
+    assert done.result.reached, done.result.reason
+    (new,) = done.spliced
+    assert new.notice_to_certified_ms == pytest.approx(2e3 * PLANNING_S, abs=20.0)
+    assert len(done.result.plans[-1].scene.obstacles) == 2
+    assert all(one.closed_edges > 0 for one in done.result.encounters)
+    told = done.comparison()
+    assert told.agrees, told.explain()
+    done.require_clear()
+
+
+def test_two_splices_in_one_motion(plan):
+    """The second leaves the motion that the first went on with."""
+    x, y = tip_at(plan, 0.7)
+    begin = Arrival(0.1 * plan.trajectory.duration_s, circle(x, y, 2.0))
+    second = Outcome([begin], beside=prompt()).result.plans[-1]
+    u, v = tip_at(second, 0.9)
+    done = Outcome([begin, Arrival(0.4 * second.trajectory.duration_s, circle(u, v, 2.0))], beside=prompt())
+    assert done.result.reached, done.result.reason
+    assert len(done.spliced) == 2, done.result.encounters
+    told = done.comparison()
+    assert told.agrees, told.explain()
+    assert told.max_timing_error_ticks <= PIN_TICKS
+    assert not any(done.record.lost_full_steps)
+    done.require_clear()
