@@ -3,7 +3,6 @@
 namespace planarm {
 
 using path_clock::Slice;
-using step_engine::Piece;
 
 namespace {
 
@@ -28,20 +27,20 @@ Intervals stretched(const Slice& slice, const Intervals& path, uint16_t first_pa
             multiply_q16(path.last, slice.stretch_at(last_middle))};
 }
 
-// Intervals that bring `steps` steps over `span_ticks`, exactly, and grow as `wanted` does.
-void fit(Piece& piece, uint32_t span_ticks, const Intervals& wanted) {
-    const uint8_t intervals = static_cast<uint8_t>(piece.steps - 1);
+// Intervals that bring the run's steps over `span_ticks`, exactly, and grow as `wanted` does.
+void fit(Run& run, uint32_t span_ticks, const Intervals& wanted) {
+    const uint8_t intervals = static_cast<uint8_t>(run.steps - 1);
     const uint32_t mean_q16 = hal::divide_q16(span_ticks, intervals);
-    piece.interval_q16 = mean_q16;
-    piece.add_q16 = 0;
+    run.interval_q16 = mean_q16;
+    run.add_q16 = 0;
     if (intervals == 1) return;
     const bool shrinks = wanted.last < wanted.first;
     const uint32_t growth = shrinks ? wanted.first - wanted.last : wanted.last - wanted.first;
     const uint8_t changes = static_cast<uint8_t>(intervals - 1);
     const uint32_t add = hal::divide_q16(growth >> 16, changes);  // whole ticks of the growth are enough
     const uint32_t half = multiply(add, changes).low / 2 + (multiply(add, changes).high << 15);
-    piece.add_q16 = shrinks ? 0 - add : add;
-    piece.interval_q16 = shrinks ? mean_q16 + half : mean_q16 - half;
+    run.add_q16 = shrinks ? 0 - add : add;
+    run.interval_q16 = shrinks ? mean_q16 + half : mean_q16 - half;
 }
 
 }  // namespace
@@ -56,6 +55,7 @@ void Cursor::begin(const Move& move) {
     interval_q16_ = move.interval_q16;
     add_q16_ = move.add_q16;
     left_ = move.steps;
+    guess_ = 0;
     positive_ = move.positive;
 }
 
@@ -74,98 +74,91 @@ bool Cursor::is_calm(const Slice& slice, uint32_t start_stop_ticks) const {
     return multiply_q16(least, slice.least_stretch()) >= start_stop_ticks;
 }
 
-// Newton's method on the steps' times, in whole steps. Where intervals shrink it comes nearer from below;
-// where they grow it goes too far once and comes down from above. At one interval the first try is right.
-uint8_t Cursor::steps_before(uint16_t path_ticks, bool ends_segment, Fixed48& to_last) const {
+bool Cursor::find_last(Steps& steps) const {
+    const uint8_t before = static_cast<uint8_t>(steps.count - 1);
+    const Fixed48 time = run_time(before, interval_q16_, add_q16_);
+    if (time.high > 0xFFFF) return false;
+    const uint32_t time_q16 = (time.high << 16) | time.low;
+    steps.last_q16 = time_q16 + at_.low;
+    steps.interval_q16 = interval_q16_;
+    if (add_q16_ != 0) steps.interval_q16 += static_cast<uint32_t>(add_q16_) * before;
+    return steps.last_q16 >= time_q16;
+}
+
+// Those before a border so far away; the last slice of a segment takes all that are left. From slice to slice
+// their number changes little: the last one is a good guess, and step by step it becomes right.
+Cursor::Steps Cursor::steps_before(uint16_t path_ticks, bool ends_segment) const {
     const uint8_t most =
         left_ < step_engine::MAX_RUN_STEPS ? static_cast<uint8_t>(left_) : step_engine::MAX_RUN_STEPS;
-    if (ends_segment) {
-        to_last = run_time(static_cast<uint8_t>(most - 1), interval_q16_, add_q16_);
-        return most;
+    Steps steps;
+    steps.count = guess_;
+    if (guess_ == 0) {
+        const uint16_t whole = static_cast<uint16_t>(interval_q16_ >> 16);
+        const uint16_t many = path_ticks <= whole ? 0 : static_cast<uint16_t>(path_ticks / (whole + 1u));
+        steps.count = many < most ? static_cast<uint8_t>(many + 1) : most;
     }
-    to_last = {0, 0};
-    uint8_t steps = 1;
-    uint32_t interval = interval_q16_;  // to the step after those
+    if (ends_segment || steps.count > most) steps.count = most;
+    while (!find_last(steps)) steps.count = static_cast<uint8_t>(steps.count - (steps.count + 3u) / 4);
+    if (ends_segment && steps.count == most) return steps;
+
+    const uint32_t border_q16 = static_cast<uint32_t>(path_ticks) << 16;
     const uint32_t add = static_cast<uint32_t>(add_q16_);
-    for (;;) {
-        const int32_t room = static_cast<int32_t>(path_ticks - ticks_to(to_last));
-        if (room > 0) {
-            if (steps == most) return steps;
-            // Rounded so that at one interval the last of these steps is still before the border.
-            const uint16_t whole = static_cast<uint16_t>(interval >> 16);
-            uint16_t more = static_cast<uint16_t>(static_cast<uint16_t>(room - 1) / (whole + 1u));
-            if (more > static_cast<uint8_t>(most - steps)) more = static_cast<uint8_t>(most - steps);
-            Fixed48 time = more < 2 ? Fixed48{whole, static_cast<uint16_t>(interval)}
-                                    : run_time(static_cast<uint8_t>(more), interval, add_q16_);
-            if (more == 0) {
-                more = 1;
-                Fixed48 next = to_last;
-                add_to(next, time);
-                if (ticks_to(next) >= path_ticks) return steps;
-            }
-            add_to(to_last, time);
-            interval += add * static_cast<uint8_t>(more);
-            steps = static_cast<uint8_t>(steps + more);
-        } else {
-            interval -= add;
-            const uint32_t beyond = static_cast<uint32_t>(-room) / ((interval >> 16) + 1);
-            const uint8_t less = beyond == 0 ? 1 : static_cast<uint8_t>(beyond);
-            subtract_from(to_last, run_time(less, interval, -add_q16_));
-            interval -= add * static_cast<uint8_t>(less - 1);
-            steps = static_cast<uint8_t>(steps - less);
-        }
+    while (steps.last_q16 >= border_q16) {
+        steps.interval_q16 -= add;
+        steps.last_q16 -= steps.interval_q16;
+        --steps.count;
     }
+    while (steps.count != most && steps.interval_q16 < border_q16 - steps.last_q16) {
+        steps.last_q16 += steps.interval_q16;
+        steps.interval_q16 += add;
+        ++steps.count;
+    }
+    return steps;
 }
 
-void Cursor::advance(uint8_t steps, Fixed48 to_last) {
-    left_ = static_cast<uint16_t>(left_ - steps);
-    if (left_ == 0) return;
-    const uint32_t grown = static_cast<uint32_t>(add_q16_) * static_cast<uint8_t>(steps - 1);
-    const uint32_t interval = interval_q16_ + grown;
-    add_to(to_last, {interval >> 16, static_cast<uint16_t>(interval)});
-    add_to(at_, to_last);
-    interval_q16_ = interval + static_cast<uint32_t>(add_q16_);
+void Cursor::advance(const Steps& steps) {
+    left_ = static_cast<uint16_t>(left_ - steps.count);
+    guess_ = steps.count;
+    const uint16_t last_low = static_cast<uint16_t>(steps.last_q16);
+    at_.low = static_cast<uint16_t>(last_low + steps.interval_q16);
+    at_.high += (steps.last_q16 >> 16) + (steps.interval_q16 >> 16) + (at_.low < last_low ? 1 : 0);
+    interval_q16_ = steps.interval_q16 + static_cast<uint32_t>(add_q16_);
 }
 
-Piece Cursor::take(const Slice& slice) {
-    Piece piece;
-    piece.positive = positive_;
-    piece.fraction = at_.low;
-    piece.interval_q16 = interval_q16_;
-    piece.add_q16 = static_cast<uint32_t>(add_q16_);
-    Fixed48 to_last;
-    const uint16_t to_border = static_cast<uint16_t>(slice.end_path() - at_.high);
-    piece.steps = steps_before(to_border, slice.ends_segment(), to_last);
+bool Cursor::take(const Slice& slice, Run& run) {
+    Steps steps = steps_before(static_cast<uint16_t>(slice.end_path() - at_.high), slice.ends_segment());
+    Intervals wanted = {interval_q16_, steps.interval_q16 - static_cast<uint32_t>(add_q16_)};
     const uint16_t first_path = slice.path_of(at_.high);
-    piece.first_ticks = slice.ticks_at(first_path);
-    uint32_t last_ticks = piece.first_ticks;
-    if (piece.steps > 1) {
-        Fixed48 last = at_;
-        add_to(last, to_last);
-        const uint16_t last_path = slice.path_of(last.high);
+    const uint16_t last_path = static_cast<uint16_t>(first_path + (steps.last_q16 >> 16));
+    if (steps.count > 1 && !slice.is_plain()) wanted = stretched(slice, wanted, first_path, last_path);
+    if (steps.count > 1 && !are_near(wanted)) {
+        steps.count = 1;
+        find_last(steps);
+    }
+
+    run.positive = positive_;
+    run.steps = steps.count;
+    run.fraction = at_.low;
+    run.interval_q16 = interval_q16_;
+    run.add_q16 = static_cast<uint32_t>(add_q16_);
+    run.first_ticks = slice.ticks_at(first_path);
+    uint32_t last_ticks = run.first_ticks;
+    if (steps.count == 1) {
+        run.fraction = 0;
+    } else {
         last_ticks = slice.ticks_at(last_path);
-        const uint32_t grown = static_cast<uint32_t>(add_q16_) * static_cast<uint8_t>(piece.steps - 2);
-        Intervals wanted = {interval_q16_, interval_q16_ + grown};
-        if (!slice.is_plain()) wanted = stretched(slice, wanted, first_path, last_path);
-        if (!are_near(wanted)) {
-            piece.steps = 1;
-            to_last = {0, 0};
-            last_ticks = piece.first_ticks;
-        } else if (!slice.is_plain()) {
-            piece.fraction = 0;
-            fit(piece, last_ticks - piece.first_ticks, wanted);
+        if (!slice.is_plain()) {
+            run.fraction = 0;
+            fit(run, last_ticks - run.first_ticks, wanted);
         }
     }
-    if (piece.steps == 1) piece.fraction = 0;
 
-    piece.near = has_moved_ && piece.first_ticks - last_ticks_ <= MOST_AHEAD_TICKS;
+    const bool near = has_moved_ && run.first_ticks - last_ticks_ <= MOST_AHEAD_TICKS;
     has_moved_ = true;
     last_ticks_ = last_ticks;
-    last_path_ticks_ = at_.high + to_last.high;
-    const uint16_t fraction = static_cast<uint16_t>(at_.low + to_last.low);
-    if (fraction < at_.low) ++last_path_ticks_;
-    advance(piece.steps, to_last);
-    return piece;
+    last_path_ticks_ = at_.high + (steps.last_q16 >> 16);
+    advance(steps);
+    return near;
 }
 
 void Cursor::finish(uint32_t segment_ticks) { last_path_ticks_ -= segment_ticks; }

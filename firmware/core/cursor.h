@@ -24,8 +24,9 @@ class Cursor {
     // True when the joint is slower than its start-stop speed all over a slice that was not begun yet.
     bool is_calm(const path_clock::Slice& slice, uint32_t start_stop_ticks) const;
 
-    // Makes a run of the next steps in a slice of the segment; has_step_before its end must hold.
-    step_engine::Piece take(const path_clock::Slice& slice);
+    // Makes a run of the next steps in a slice of the segment; has_step_before its end must hold. True when
+    // it is close enough to the step before for the step interrupt to go on by itself.
+    bool take(const path_clock::Slice& slice, Run& run);
 
     // The segment lasts so long.
     void finish(uint32_t segment_ticks);
@@ -34,19 +35,24 @@ class Cursor {
     void shift(uint32_t ticks) { last_ticks_ += ticks; }
 
   private:
-    // How many steps the next run makes before a border so far away, and the time from the first to the last
-    // of them. The last slice of a segment takes them all.
-    uint8_t steps_before(uint16_t path_ticks, bool ends_segment, Fixed48& to_last) const;
-    // Ticks from the next step's to that of a step so long after it.
-    uint32_t ticks_to(Fixed48 time) const {
-        return time.high + (static_cast<uint16_t>(at_.low + time.low) < time.low ? 1 : 0);
-    }
-    void advance(uint8_t steps, Fixed48 to_last);
+    // The next steps of a slice. Times are in 2^-16 ticks from the tick of the first of them: steps of one
+    // slice are less than 65,536 ticks apart.
+    struct Steps {
+        uint8_t count;
+        uint32_t last_q16;      // time of the last of them
+        uint32_t interval_q16;  // from the last of them to the step after
+    };
+
+    Steps steps_before(uint16_t path_ticks, bool ends_segment) const;
+    // False when the last of so many steps comes later than 2^32 can tell.
+    bool find_last(Steps& steps) const;
+    void advance(const Steps& steps);
 
     Fixed48 at_;  // path time of the next step, from the segment's start
     uint32_t interval_q16_;
     int32_t add_q16_;
     uint16_t left_;
+    uint8_t guess_;  // steps of the segment's slice before; 0: none yet
     bool positive_;
     bool has_moved_;
     uint32_t last_path_ticks_;  // path time of the last step, from the segment's start, modulo 2^32

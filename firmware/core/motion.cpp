@@ -195,7 +195,8 @@ bool is_calm() {
     filling = true;
 }
 
-// Hands one run over, of each joint in its turn. True when nothing of the slice is left.
+// Hands runs over, one of each joint; while the clock is stretched, when one takes long, of one joint in its
+// turn. True when nothing of the slice is left.
 bool Motion::fill_slice() {
     bool more = false;
     uint8_t joint = turn;
@@ -203,8 +204,8 @@ bool Motion::fill_slice() {
         joint = joint == wire::JOINTS - 1 ? 0 : static_cast<uint8_t>(joint + 1);
         Cursor& cursor = cursors[joint];
         if (!cursor.has_step_before(slice.end_path())) continue;
-        if (!urgent && step_engine::has_room(joint)) {
-            step_engine::append(joint, cursor.take(slice));
+        if ((!urgent || slice.is_plain()) && step_engine::has_room(joint)) {
+            step_engine::append(joint, cursor.take(slice, step_engine::next_run(joint)));
             urgent = true;
             turn = joint;
         }
@@ -322,8 +323,8 @@ uint8_t Motion::rate_percent() const {
 Progress Motion::serve() {
     if (!running) return Progress::GOING;
     if (frozen) return serve_frozen();
-    prepare();
     if (!step_engine::serve()) return Progress::MISSED;
+    prepare();
     bool ends_motion = false;
     if (retire(ends_motion)) {
         clear();

@@ -79,8 +79,7 @@ uint32_t Slice::stretch_at(uint16_t path) const {
     return s0_ - multiply(s0_ - s1_, share).high;
 }
 
-uint32_t Slice::ticks_at(uint16_t path) const {
-    if (is_plain()) return start_ticks_ + path;
+uint32_t Slice::stretched_ticks_at(uint16_t path) const {
     const uint32_t end = stretch_at(path);
     const uint32_t mean = (s0_ + end + (end < s0_ ? 1 : 0)) >> 1;  // rounded to the start's side
     return start_ticks_ + multiply(mean, path).high;

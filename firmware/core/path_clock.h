@@ -53,7 +53,7 @@ class Slice {
     // Path time since the slice's start of a path time of the segment, before the slice's end.
     uint16_t path_of(uint32_t path) const { return static_cast<uint16_t>(path - from_path_); }
     // The tick of such a path time, and the stretch there.
-    uint32_t ticks_at(uint16_t path) const;
+    uint32_t ticks_at(uint16_t path) const { return plain_ ? start_ticks_ + path : stretched_ticks_at(path); }
     uint32_t stretch_at(uint16_t path) const;
 
     // The clock stood still.
@@ -63,6 +63,8 @@ class Slice {
     }
 
   private:
+    uint32_t stretched_ticks_at(uint16_t path) const;
+
     uint32_t start_ticks_;
     uint32_t end_ticks_;
     uint32_t end_path_;

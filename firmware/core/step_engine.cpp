@@ -179,20 +179,17 @@ bool has_room(uint8_t joint) {
     return ring.free->next != ring.oldest;
 }
 
-void append(uint8_t joint, const Piece& piece) {
+Run& next_run(uint8_t joint) { return *rings[joint].free; }
+
+void append(uint8_t joint, bool near) {
     Ring& ring = rings[joint];
     Run& run = *ring.free;
-    run.interval_q16 = piece.interval_q16;
-    run.add_q16 = piece.add_q16;
-    run.fraction = piece.fraction;
-    run.steps = piece.steps;
-    run.first_ticks = piece.first_ticks;
-    run.positive = piece.positive;
-    run.dir_high = piece.positive != ring.dir_inverted;
-    const Chain near = piece.positive == ring.positive ? Chain::ONWARD : Chain::REVERSED;
-    ring.positive = piece.positive;
+    run.dir_high = run.positive != ring.dir_inverted;
+    Chain chain = Chain::NONE;
+    if (near) chain = run.positive == ring.positive ? Chain::ONWARD : Chain::REVERSED;
+    ring.positive = run.positive;
     hal::compiler_barrier();
-    run.chained = piece.near ? near : Chain::NONE;
+    run.chained = chain;
     ring.free = run.next;
 }
 

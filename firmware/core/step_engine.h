@@ -64,19 +64,12 @@ void reset();
 // True while `joint` can take another run. Takes executed ones back.
 bool has_room(uint8_t joint);
 
-// A run to be appended.
-struct Piece {
-    uint32_t first_ticks;
-    uint32_t interval_q16;
-    uint32_t add_q16;
-    uint16_t fraction;
-    uint8_t steps;
-    bool positive;
-    bool near;  // close enough to the joint's step before for the step interrupt to go on by itself
-};
+// The run to be appended next, to be filled: all but `next`, `chained` and `dir_high`; has_room must hold.
+Run& next_run(uint8_t joint);
 
-// Appends a run; has_room must hold.
-void append(uint8_t joint, const Piece& piece);
+// Appends it. `near`: it is close enough to the joint's step before for the step interrupt to go on by
+// itself.
+void append(uint8_t joint, bool near);
 
 // Sets which level of DIR is the positive direction; the joint must be at rest.
 void set_dir_inverted(uint8_t joint, bool inverted);

@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 import random
+from collections.abc import Callable
 from fractions import Fraction
 from pathlib import Path
 
@@ -30,6 +31,7 @@ from planarm_wire.messages import (
     Enable,
     Fault,
     PinMap,
+    Query,
     Result,
     Resume,
     Segment,
@@ -41,7 +43,7 @@ from planarm_wire.messages import (
 
 RELEASE = Path(__file__).parents[2] / "firmware" / "release"
 OTHERS = ["uno_four", "cnc_shield", "cnc_shield_four"]
-FIFTEEN_K, TWELVE_K = TICKS_HZ // 15_000, TICKS_HZ // 12_500
+FIFTEEN_K = TICKS_HZ // 15_000
 # Largest distance of a rise from its tick: 0 on a compare output, 12 us of joints 3 and 4; on the shield what may run
 # when a step of joint 1 or 2 is due.
 MOST_OFF_TICKS = {"uno_four": (0, 0, 192, 192), "cnc_shield": (160, 160), "cnc_shield_four": (480, 480, 192, 192)}
@@ -52,10 +54,9 @@ def emulated(name: str) -> EmulatedFirmware:
     return EmulatedFirmware(RELEASE / f"{name}.hex", BOARDS[name])
 
 
-def steady(name: str, interval: int, seconds: float) -> list[Segment]:
+def steady(name: str, interval: int, seconds: float, duration: int = 8 * SLICE_TICKS) -> list[Segment]:
     """All joints at nearly one interval, each a little slower than the one before it, so that all phases occur."""
     joints = BOARDS[name].joints
-    duration = 8 * SLICE_TICKS
     intervals = [round(256 * interval * ratio) for ratio in (1.0, 1.0037, 1.0071, 1.0113)[:joints]]
     begun_at = [Fraction(7 * joint) for joint in range(joints)]
     segments = []
@@ -118,20 +119,24 @@ def test_pins_are_quiet_from_reset_on(name: str) -> None:
     assert all(uno.pin(pin).level == 1 for pin in (*wiring.limit_pins, wiring.stop_pin)), "pulled up"
 
 
+@pytest.mark.parametrize("content", ["segments", "queries"])
 @pytest.mark.parametrize("name", OTHERS)
-def test_all_joints_at_their_rate_on_a_saturated_line(name: str) -> None:
-    interval = max(BOARDS[name].min_interval_ticks, TWELVE_K if BOARDS[name].joints == 4 else 0)
-    motion = steady(name, interval, 0.5)
+def test_all_joints_at_their_rate_on_a_saturated_line(
+    name: str, content: str, sized: Callable[[int, int], int]
+) -> None:
+    # Valid frames without a gap, for a quarter of a second or ten, at the board's least interval.
+    interval = BOARDS[name].min_interval_ticks
+    duration = sized(8 * SLICE_TICKS, 10 * TICKS_HZ // 8)
+    motion = steady(name, interval, 8 * duration / TICKS_HZ, duration)
     firmware = emulated(name)
     board = Board(firmware)
     board.get_ready()
-    queued = motion[:8]
-    motion = end_motion(queued)
     for segment in motion:
         board.ask(Segments(0, 0, 0, (segment,)))
     board.ask(Start(LEAD_TICKS))
-    frame = encode_frame(board.seq - 1, *encode(Segments(0, 0, 0, (motion[0],))))
-    end = board.now + LEAD_TICKS + 8 * 8 * SLICE_TICKS + 100_000
+    message = Query() if content == "queries" else Segments(0, 0, 0, (motion[0],))
+    frame = encode_frame(board.seq - 1, *encode(message))
+    end = board.now + LEAD_TICKS + 8 * duration + 100_000
     while board.now < end:
         while firmware.uno.serial.pending < HOST_WINDOW_BYTES:
             board.receive(frame)
