@@ -95,7 +95,9 @@ def read_settings(environment: str) -> tuple[list[str], list[Path]]:
 def require_free_registers(elf: Path, flags: list[str]) -> None:
     """Raise BuildError if any code but the interrupts uses a register that `flags` keep for them (-ffixed-rN).
 
-    The flags bind our own compiler only; the libraries of the compiler are linked as they are.
+    The flags bind our own compiler only; the libraries of the compiler are linked as they are. Of those the common
+    prologue and epilogue (-mcall-prologues) save and restore all registers that calls keep, the interrupts' first: what
+    counts is the code from where the earliest jump goes.
     """
     numbers = [flag.removeprefix("-ffixed-r") for flag in flags if flag.startswith("-ffixed-r")]
     kept = re.compile(rf"\br(?:{'|'.join(numbers)})\b")
@@ -104,13 +106,18 @@ def require_free_registers(elf: Path, flags: list[str]) -> None:
     if code is None:
         raise BuildError(f"{elf}: no __ctors_end, where the code begins")
     disassemble = ["avr-objdump", "-d", "--no-show-raw-insn", f"--start-address=0x{code.group(1)}", str(elf)]
-    for function in run(disassemble).split("\n\n"):
-        if re.search(r"<(__vector_(7|11|12|18|19)|_ZN3hal\d+(set_)?step_fraction\w+)>", function.split("\n", 1)[0]):
+    listing = run(disassemble)
+    jumps = re.findall(r"\s0x([0-9a-f]+) <(__prologue_saves__|__epilogue_restores__)\b", listing)
+    entered = {name: min(int(at, 16) for at, to in jumps if to == name) for _, name in jumps}
+    for function in listing.split("\n\n"):
+        title, *lines = function.splitlines() or [""]
+        name = title.partition("<")[2].rstrip(">:")
+        if re.fullmatch(r"__vector_(7|11|12|18|19)|_ZN3hal\d+(set_)?step_fraction\w+", name):
             continue
-        for line in function.splitlines()[1:]:
+        for line in lines:
             address, _, instruction = line.partition(":\t")
-            if kept.search(instruction.split(";", 1)[0]):
-                name = function.split("\n", 1)[0]
+            reached = name not in entered or int(address, 16) >= entered[name]
+            if reached and kept.search(instruction.split(";", 1)[0]):
                 raise BuildError(f"{elf}: {name} {address.strip()}: {instruction!r} uses a register of the interrupts")
 
 
