@@ -22,6 +22,9 @@ from planarm.analysis.capture import open_capture
 from planarm.analysis.channels import map_channels
 from planarm.analysis.step_match import Schedule
 from planarm.analysis.timing import PulseLimits, TimingRules, analyse
+from planarm_wire.messages import BOARDS
+
+PINS = BOARDS["uno"].joint_pins
 
 CODES = ("!", '"')
 
@@ -49,7 +52,7 @@ def run(edges: int, path: Path) -> None:
     small = path.with_name("small.vcd")
     warm_up = write(small, 1000)
     capture = open_capture(path)
-    channels = map_channels(path, capture.channels, [])
+    channels = map_channels(path, capture.channels, [], PINS)
     analyse(open_capture(small), channels, warm_up, rules)  # the kernels
     began = time.perf_counter()
     report = analyse(capture, channels, schedules, rules)

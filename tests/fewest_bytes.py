@@ -15,9 +15,9 @@ import numpy as np
 from scipy.optimize import linprog
 
 from planarm.stepping.segments import Coding
-from planarm.stepping.train import MIN_REVERSAL_TICKS, StepTrain
+from planarm.stepping.train import StepTrain, least_reversal_ticks
 from planarm.stepping.windows import least_interval_ticks
-from planarm_wire.messages import MAX_INTERVAL_TICKS, MAX_SEGMENT_TICKS, MIN_DIR_SETUP_TICKS
+from planarm_wire.messages import BOARDS, MAX_INTERVAL_TICKS, MAX_SEGMENT_TICKS, MIN_DIR_SETUP_TICKS
 
 SHARE_OF_FRAME = 4
 """Bytes of a segment's frame beside it: header 3, two checks of 2, delimiter; as a rule two segments share a frame."""
@@ -94,7 +94,7 @@ class _Joint:
     def __init__(self, steps, start_stop, duration, coding):
         self.ticks, self.directions = steps.ticks.astype(float), steps.directions
         self.fast = np.diff(self.ticks) < start_stop
-        self.least = least_interval_ticks(steps)  # compression makes no interval shorter
+        self.least = least_interval_ticks(steps, BOARDS["uno"])  # compression makes no interval shorter
         gaps = np.diff(self.ticks)
         if len(gaps):
             shorter = np.minimum(np.r_[gaps[:1], gaps], np.r_[gaps, gaps[-1:]])
@@ -104,7 +104,7 @@ class _Joint:
         self.low, self.high = self.ticks - np.floor(tolerance), self.ticks + np.floor(tolerance)
         self.high = np.minimum(self.high, duration - 1)
         for n in range(len(self.ticks)):  # as early as the steps before allow
-            gap = self.least if self.setup(n) == 0 else MIN_REVERSAL_TICKS
+            gap = self.least if self.setup(n) == 0 else least_reversal_ticks(BOARDS["uno"])
             self.low[n] = max(self.low[n], self.low[n - 1] + gap if n else self.setup(n))
         self.sizes = {}
         for n in range(len(self.ticks)):

@@ -58,7 +58,7 @@ from planarm.trajectory.limits import Limits
 from planarm.trajectory.motion import Trajectory
 from planarm.trajectory.timing import fastest_motion
 from planarm.workspace.free_map import build_free_map
-from planarm_wire.messages import DIR_PINS, STEP_PINS, TICKS_HZ
+from planarm_wire.messages import TICKS_HZ
 
 Notice = Callable[[str, float], None]
 """Told the stage and the share of it that is done."""
@@ -100,6 +100,7 @@ def plan_scene(scene: Scene, notice: Notice, route: Route | None = None) -> Plan
     """
     began_s = time.perf_counter()
     notice("plan", 0.0)
+    _ = scene.board  # an arm that no board moves is refused before it is searched
     margin_cm = planning_margin_cm(scene)
     if scene.moving is not None:
         return plan_moving(scene, margin_cm, began_s, notice)
@@ -358,7 +359,7 @@ def judge_pins(plan: SegmentPlan, trace: PinTrace) -> Findings:
     """Count the steps from the pins' edges and hold them against the plan."""
     measured = tuple(
         measure_steps(_waveform(trace, step), _waveform(trace, direction))
-        for step, direction in zip(STEP_PINS, DIR_PINS, strict=True)
+        for step, direction in plan.board.joint_pins[: len(plan.start_usteps)]
     )
     planned = [(joint.ticks, joint.directions) for joint in expand(plan).steps]
     return Findings(measured, compare_steps(planned, measured))

@@ -15,7 +15,7 @@ from planarm.stepping.plan import SegmentPlan
 from planarm.stepping.train import StepTrain
 from planarm.trajectory.binding import TimingReport
 from planarm.trajectory.motion import Trajectory
-from planarm.workspace.free_map import FreeMap
+from planarm.workspace.free_map import RegionMap
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,7 +23,7 @@ class Plan:
     """Everything from a scene to certified segments, each stage's value kept for the report."""
 
     scene: Scene
-    free_map: FreeMap
+    free_map: RegionMap
     path: Path
     smooth_path: SmoothPath
     trajectory: Trajectory

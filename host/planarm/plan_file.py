@@ -20,7 +20,7 @@ from planarm.stepping.certify import Certificate, Check
 from planarm.stepping.plan import Allowance, SegmentPlan
 from planarm_wire.messages import SPEC_HASH, Move, Segment
 
-FORMAT = 2
+FORMAT = 3
 
 
 @dataclass(frozen=True, slots=True)
@@ -120,6 +120,7 @@ def _to_json(plan: StoredPlan) -> dict[str, Any]:
         "scene": plan.scene,
         "path_points_cm": plan.path_points_cm,
         "motion_s": plan.motion_s,
+        "wiring": plan.segments.wiring,
         "start_usteps": plan.segments.start_usteps,
         "duration_ticks": plan.segments.duration_ticks,
         "segments": [_segment_to_json(segment) for segment in plan.segments.segments],
@@ -136,6 +137,7 @@ def _from_json(body: Mapping[str, Any]) -> StoredPlan:
         duration_ticks=body["duration_ticks"],
         start_usteps=tuple(body["start_usteps"]),
         allowances=tuple(Allowance(*one) for one in body["allowances"]),
+        wiring=body["wiring"],
     )
     return StoredPlan(
         scene=body["scene"],

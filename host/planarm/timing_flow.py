@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from planarm.analysis.capture import PS_PER_TICK, open_capture
-from planarm.analysis.channels import map_channels
+from planarm.analysis.channels import Pins, map_channels
 from planarm.analysis.step_match import Schedule
 from planarm.analysis.timing import PulseLimits, TimingReport, TimingRules, analyse, recorded_schedules
 from planarm.errors import CaptureError
@@ -21,7 +21,7 @@ from planarm.scene.rebuild import scene_from_mapping
 from planarm.stepping.expand import expand
 from planarm.stepping.train import StepTrain
 from planarm_wire.drivers import DRIVERS, DriverRow
-from planarm_wire.messages import TICKS_HZ
+from planarm_wire.messages import BOARDS, TICKS_HZ
 
 Notice = Callable[[str, float], None]
 Point = tuple[float, float]
@@ -40,6 +40,7 @@ class TimingRequest:
         driver: name of the driver whose rules hold for all joints; None takes the plan's, or none.
         channels: words like "step1=D9"; none takes the board's pin names.
         tolerance_us: beyond which a step is off its time.
+        board: whose pins' names count; None takes the plan's, or uno's.
     """
 
     capture: Path
@@ -47,6 +48,7 @@ class TimingRequest:
     driver: str | None
     channels: tuple[str, ...]
     tolerance_us: float
+    board: str | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,7 +69,7 @@ def judge_recording(request: TimingRequest, notice: Notice) -> TimingFindings:
     """
     plan = load_plan(request.plan) if request.plan else None
     capture = open_capture(request.capture)
-    channels = map_channels(request.capture, capture.channels, request.channels)
+    channels = map_channels(request.capture, capture.channels, request.channels, _pins(request, plan))
     train = expand(plan.segments) if plan else None
     drivers = _drivers(request.driver, plan, channels.joints)
     rules = TimingRules(
@@ -88,9 +90,10 @@ def compare_recordings(first: Path, request: TimingRequest, notice: Notice) -> T
         CaptureError: one of them cannot be read or lacks a line.
     """
     reference = open_capture(first)
-    schedules = recorded_schedules(reference, map_channels(first, reference.channels, request.channels))
+    pins = _pins(request, None)
+    schedules = recorded_schedules(reference, map_channels(first, reference.channels, request.channels, pins))
     capture = open_capture(request.capture)
-    channels = map_channels(request.capture, capture.channels, request.channels)
+    channels = map_channels(request.capture, capture.channels, request.channels, pins)
     drivers = _drivers(request.driver, None, channels.joints)
     rules = TimingRules(tuple(_limits(driver) for driver in drivers), request.tolerance_us)
     report = analyse(capture, channels, schedules, rules, notice)
@@ -113,6 +116,15 @@ def tips_at(plan: StoredPlan, train: StepTrain, times_s: Sequence[float | None])
     for n, (x, y) in zip(known, forward(Arm.from_spec(scene.arm), q_rad)[:, -1].tolist(), strict=True):
         tips[n] = (x, y)
     return tips
+
+
+def _pins(request: TimingRequest, plan: StoredPlan | None) -> Pins:
+    """Return STEP and DIR pins of each joint: of the board that is named, or of the plan's joints."""
+    if request.board is not None:
+        return BOARDS[request.board].joint_pins
+    if plan is None:
+        return BOARDS["uno"].joint_pins
+    return plan.segments.board.joint_pins[: len(plan.segments.start_usteps)]
 
 
 def _schedules(train: StepTrain) -> list[Schedule]:

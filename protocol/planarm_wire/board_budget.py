@@ -1,21 +1,43 @@
-"""What the released firmware takes of its processor, measured on the emulator (firmware/README.md, budgets)."""
+"""What the released images take of their processor, measured on the emulator (firmware/README.md, budgets)."""
 
 from __future__ import annotations
 
 from typing import Final
 
-STEP_INTERRUPT_TICKS: Final = 79
-"""A step's interrupt."""
+COMPARE_TICKS: Final = 79
+"""A step that a compare output makes."""
+PORT_TICKS: Final = 91
+"""A step on another pin by the same interrupt."""
+SHARED_TICKS: Final = 210
+"""A step of joint 3 or 4, alone in their interrupt; two in one take less than twice as long."""
+
+STEP_INTERRUPT_TICKS: Final[dict[str, tuple[int, ...]]] = {
+    "uno": (COMPARE_TICKS,) * 2,
+    "uno_four": (COMPARE_TICKS,) * 2 + (SHARED_TICKS,) * 2,
+    "cnc_shield": (PORT_TICKS,) * 2,
+    "cnc_shield_four": (PORT_TICKS,) * 2 + (SHARED_TICKS,) * 2,
+}
+"""Of each board, by its name: each joint's step."""
+
+READ_TICKS: Final = 7_000
+READ_JOINT_TICKS: Final = 4_000
+"""The main program's work on a segment, and on each joint that it moves, from the rates at which it just keeps up: two
+joints at 12,000 to 15,000 ticks with a busy line; with the queue filled beforehand two at 9,200 (uno) and 9,900, three
+at 12,800, four at 15,000 (uno_four)."""
+SLICE_JOINT_TICKS: Final = 4_000
+"""The same on each joint in each further slice of it."""
+
 LINE_LOAD: Final = 0.1
 """Share of the processor that the interrupts of a busy line take."""
-READ_TICKS: Final = 15_000
-"""The main program's work on a segment, from the rates at which it just keeps up (12,000 to 15,000)."""
-SLICE_WORK_TICKS: Final = 8_000
-"""The same on each further slice of it."""
 STRETCHED_TICKS: Final = 17_000
-"""What it needs more for a segment that is stretched: with those of 0.5 and 1 ms it keeps up at one every 2.0 ms, and
+"""What uno needs more for a segment that is stretched: with those of 0.5 and 1 ms it keeps up at one every 2.0 ms, and
 not at one every 1.7 ms."""
 LATEST_READ_TICKS: Final = 40_000
 """How long before its start a segment must be there."""
 LEAST_SHARE: Final = 0.05
 """Keeps an overloaded board's time finite."""
+
+
+def work_ticks(joints: int, further_slices: int) -> int:
+    """Return the main program's work on a segment of an arm with so many joints, cut into so many slices and one."""
+    return READ_TICKS + joints * (READ_JOINT_TICKS + SLICE_JOINT_TICKS * further_slices)

@@ -29,3 +29,13 @@ class Board:
     """The stop input, closed to ground while all is well."""
     limit_pins: tuple[str, ...]
     """One a joint."""
+
+    @property
+    def driver_pins(self) -> tuple[str, ...]:
+        """All that drivers hang on: STEP of each joint, DIR of each, ENABLE."""
+        return (*self.step_pins, *self.dir_pins, self.enable_pin)
+
+    @property
+    def joint_pins(self) -> tuple[tuple[str, str], ...]:
+        """STEP and DIR of each joint."""
+        return tuple(zip(self.step_pins, self.dir_pins, strict=True))

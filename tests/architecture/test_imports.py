@@ -19,7 +19,8 @@ ALLOWED: dict[str, set[str]] = {
     "planarm.output": {"planarm.errors"},
     # docs/decisions/0081: codes of everything that can go wrong
     "planarm.explain": {"planarm_wire", "planarm.errors"},
-    "planarm.scene": {"planarm.errors"},
+    # docs/decisions/0103: a scene says its board
+    "planarm.scene": {"planarm_wire", "planarm.errors"},
     "planarm.model": {"planarm_wire.kernel_cache", "planarm.errors", "planarm.scene"},
     "planarm.workspace": {"planarm_wire.kernel_cache", "planarm.errors", "planarm.scene", "planarm.model"},
     "planarm.search": {

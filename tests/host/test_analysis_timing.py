@@ -12,7 +12,9 @@ from planarm.analysis.channels import map_channels
 from planarm.analysis.step_match import Schedule
 from planarm.analysis.timing import PulseLimits, TimingRules, analyse
 from planarm.errors import CaptureError
-from planarm_wire.messages import TICKS_HZ
+from planarm_wire.messages import BOARDS, TICKS_HZ
+
+PINS = BOARDS["uno"].joint_pins
 
 DRIVER = PulseLimits(step_high_s=1.9e-6, step_low_s=1.9e-6, dir_setup_s=0.65e-6, dir_hold_s=0.65e-6)
 FORMATS = {
@@ -40,7 +42,7 @@ def judged(tmp_path, kind, recorded, planned, rules=None):
     capture = open_capture(path)
     return analyse(
         capture,
-        map_channels(path, capture.channels, words),
+        map_channels(path, capture.channels, words, PINS),
         None if planned is None else schedules_of(planned),
         rules or TimingRules((DRIVER, DRIVER), tolerance_us=1.5),
     )
@@ -150,7 +152,7 @@ def test_an_interrupt_that_held_an_edge_up_is_named(tmp_path):
     lines[at:at] = [f"#{due - 20_000}", "b10010 ~", f"#{due + 45_000}", "b0 ~"]
     path.write_text("\n".join(lines) + "\n")
     capture = open_capture(path)
-    report = analyse(capture, map_channels(path, capture.channels, []), schedules_of(train), TimingRules())
+    report = analyse(capture, map_channels(path, capture.channels, [], PINS), schedules_of(train), TimingRules())
     assert [(f.kind, f.cause) for f in report.findings] == [("late", "interrupt USART_RX")]
 
 
@@ -178,14 +180,14 @@ def test_a_plan_of_other_joints_is_refused(tmp_path):
     write_vcd(tmp_path / "a.vcd", train)
     capture = open_capture(tmp_path / "a.vcd")
     with pytest.raises(CaptureError, match="the plan has 1 joints, 2 are mapped"):
-        analyse(capture, map_channels(capture.path, capture.channels, []), schedules_of(train)[:1], TimingRules())
+        analyse(capture, map_channels(capture.path, capture.channels, [], PINS), schedules_of(train)[:1], TimingRules())
 
 
 def test_lines_that_never_rise_are_told(tmp_path):
     write_vcd(tmp_path / "a.vcd", replace(two_joints(), joints=((), ())))
     capture = open_capture(tmp_path / "a.vcd")
     with pytest.raises(CaptureError, match="no STEP line rises"):
-        analyse(capture, map_channels(capture.path, capture.channels, []), None, TimingRules())
+        analyse(capture, map_channels(capture.path, capture.channels, [], PINS), None, TimingRules())
 
 
 def test_ticks_are_as_wide_as_the_firmwares():

@@ -14,9 +14,10 @@ from planarm.link import recording
 from planarm.link.dump import Dump
 from planarm.link.exchange import stream_plan
 from planarm.link.journal import Kind, Record, read_journal
-from planarm.link.replay import PINS, replay
+from planarm.link.replay import replay
 from planarm.pipeline import plan_scene
 from planarm.scene import load_scene
+from planarm_wire.messages import BOARDS
 
 
 @pytest.fixture(scope="module")
@@ -39,7 +40,7 @@ def test_a_recorded_run_played_again_has_the_same_edges_and_replies(recorded):
     folder, _, line = recorded
     played = replay(read_journal(folder / "run.journal"))
     assert played.same_replies
-    for pin in PINS:
+    for pin in BOARDS["uno"].driver_pins:
         np.testing.assert_array_equal(played.line.pins.edges(pin), line.pins.edges(pin))
     assert played.edges()["D9"] > 1000
 
@@ -50,7 +51,7 @@ def test_a_broken_run_played_again_stops_where_it_did(recorded, tmp_path):
     run_until(plan, line, tmp_path, 0.3, KilledError())
     line.clock.wait_until(1.5)
     played = replay(read_journal(tmp_path / "run.journal"))
-    for pin in PINS:
+    for pin in BOARDS["uno"].driver_pins:
         np.testing.assert_array_equal(played.line.pins.edges(pin), line.pins.edges(pin))
 
 

@@ -21,6 +21,7 @@ from planarm.link.stream import StreamOptions, StreamProgress
 from planarm_wire.codec import decode, encoded_bytes
 from planarm_wire.framing import Frame, FrameDecoder, encode_frame
 from planarm_wire.messages import (
+    BOARDS,
     HOST_WINDOW_BYTES,
     QUEUE_BYTES,
     QUEUE_FRAME_BYTES,
@@ -488,25 +489,29 @@ def test_a_good_line_changes_nothing_and_takes_an_earlier_override_back():
     assert (said, result.path_clock_percent, line.device.override_percent) == ([], 100, 100)
 
 
+def margin_of(segments, sent, seen, allowances=()):
+    return line_margin(segments, sent, seen, BOARDS["uno"], allowances)
+
+
 def test_what_a_plan_asks_of_the_line_is_what_has_to_arrive_in_time():
     plan, seen = motion(300, ticks=64_000), SeenLine.of(1000, 0.1, 0.002)
     result = stream_plan(ModelLine(), plan)
-    whole = line_margin(plan, 40, seen)
+    whole = margin_of(plan, 40, seen)
     assert whole.seen.bytes_s == pytest.approx(10_000.0)
     assert whole.asked_bytes_s < result.bytes_sent / result.motion_s, "what the queue holds need not be sent in time"
-    busy = line_margin((*motion(100, ticks=320_000)[:-1], *motion(300, ticks=20_000)), 40, seen)
-    assert busy.asked_bytes_s > line_margin(motion(400, ticks=320_000), 40, seen).asked_bytes_s
-    assert line_margin(plan, 300, seen).percent == 100, "all of it is in the queue"
-    assert line_margin(plan, 40, SeenLine.of(299, 10.0, 0.002)).percent == 100, "too little was seen"
-    assert line_margin(plan, 40, SeenLine.of(1000, 100.0, 0.002)).percent == 1
-    rates = [line_margin(plan, 40, SeenLine.of(1000, 1000.0 / r, 0.002)).percent for r in range(500, 10_000, 500)]
+    busy = margin_of((*motion(100, ticks=320_000)[:-1], *motion(300, ticks=20_000)), 40, seen)
+    assert busy.asked_bytes_s > margin_of(motion(400, ticks=320_000), 40, seen).asked_bytes_s
+    assert margin_of(plan, 300, seen).percent == 100, "all of it is in the queue"
+    assert margin_of(plan, 40, SeenLine.of(299, 10.0, 0.002)).percent == 100, "too little was seen"
+    assert margin_of(plan, 40, SeenLine.of(1000, 100.0, 0.002)).percent == 1
+    rates = [margin_of(plan, 40, SeenLine.of(1000, 1000.0 / r, 0.002)).percent for r in range(500, 10_000, 500)]
     assert rates == sorted(rates)
     assert 1 < rates[1] < rates[4] < 100
     # What comes late asks for a slower motion, and so does a stop that takes more of the path that is held.
-    assert line_margin(plan, 40, SeenLine.of(1000, 0.1, 0.15)).percent < line_margin(plan, 40, seen).percent
+    assert margin_of(plan, 40, SeenLine.of(1000, 0.1, 0.15)).percent < margin_of(plan, 40, seen).percent
     long_stops = (Allowance(1e-6, 1e-6, 800_000.0),) * 300
     slow = SeenLine.of(1000, 0.4, 0.002)
-    assert line_margin(plan, 40, slow, long_stops).percent < line_margin(plan, 40, slow).percent
+    assert margin_of(plan, 40, slow, long_stops).percent < margin_of(plan, 40, slow).percent
 
 
 # -- the hand on a running stream -------------------------------------------------------------------------------------

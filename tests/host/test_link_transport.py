@@ -39,10 +39,19 @@ def test_an_unknown_scheme_names_the_known_ones():
 
 
 @pytest.mark.parametrize(
-    "url", ["sim://here", "sim:///x.hex", "sim://?hex=a", "sim://?image=a&speed=2", "sim://?usb=8u2", "sim://?isr=2"]
+    "url",
+    [
+        "sim://here",
+        "sim:///x.hex",
+        "sim://?hex=a",
+        "sim://?image=a&speed=2",
+        "sim://?usb=8u2",
+        "sim://?isr=2",
+        "sim://?board=mega",
+    ],
 )
 def test_the_emulator_takes_an_image_and_a_bridge_and_nothing_else(url):
-    with pytest.raises(LinkError, match=r"takes sim://, sim://\?image=PATH, sim://\?usb=16u2"):
+    with pytest.raises(LinkError, match=r"takes sim://, sim://\?image=PATH, sim://\?board=NAME with one of uno, "):
         open_transport(url)
 
 

@@ -110,10 +110,11 @@ def test_a_wall_between_start_and_goal_leaves_no_way():
     assert caught.value.advice
 
 
-def test_arms_of_other_than_two_links_are_searched_but_not_run():
-    scene = case_scene(1)
+def test_an_arm_with_more_joints_than_any_board_is_searched_but_not_run():
+    scene = case_scene(3)
+    assert len(scene.joints) == 7
     assert len(RoadmapTask.of(scene, scene.margin_cm).planner.solve().nodes) > 1
-    with pytest.raises(SceneError, match="3 links are searched") as caught:
+    with pytest.raises(SceneError, match=r"7 joints; the wiring own has pins for 4 \(board.wiring\)") as caught:
         plan_scene(scene, no_notice)
     assert caught.value.key == "arm.link_lengths_cm"
 

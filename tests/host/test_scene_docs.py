@@ -5,13 +5,14 @@ import tomllib
 from pathlib import Path
 
 import planarm
-from planarm.scene import dc_motors, limit_switches, load, moving, parse_scene, roadmap, task
+from planarm.scene import board, dc_motors, limit_switches, load, moving, parse_scene, roadmap, task
 
 ROOT = Path(__file__).resolve().parents[2]
 TEXT = (ROOT / "docs" / "scene.md").read_text(encoding="utf-8")
 
 TABLES = {
     "arm": load.ARM_KEYS,
+    "board": board.BOARD_KEYS,
     "workspace": load.WORKSPACE_KEYS,
     "obstacles": (*load.ROUND_KEYS, *load.POLYGON_KEYS),
     "task": task.TASK_KEYS,

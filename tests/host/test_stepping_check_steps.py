@@ -5,10 +5,11 @@ import pytest
 
 from motion_paths import joint
 from planarm.stepping.check_steps import check_counts, check_gaps
-from planarm.stepping.train import MIN_REVERSAL_TICKS, JointSteps, StepTrain
-from planarm_wire.messages import MIN_INTERVAL_TICKS
+from planarm.stepping.train import JointSteps, StepTrain, least_reversal_ticks
+from planarm_wire.messages import BOARDS, MIN_INTERVAL_TICKS
 from segment_plans import verdict_of
 
+MIN_REVERSAL_TICKS = least_reversal_ticks(BOARDS["uno"])
 NO_STEPS = JointSteps(np.zeros(0, np.int64), np.zeros(0, np.int8))
 
 

@@ -7,12 +7,12 @@ from planarm.stepping.check_wire import check_wire
 from planarm.stepping.plan import SegmentPlan
 from planarm.stepping.table import segment_bytes, table_of
 from planarm_wire.codec import encoded_bytes
-from planarm_wire.messages import MIN_INTERVAL_TICKS, Move, Segment
+from planarm_wire.messages import BOARDS, MIN_INTERVAL_TICKS, Move, Segment
 from segment_plans import REST, plan_of, verdict_of
 
 
 def checks_of(plan):
-    return check_wire(plan, table_of(plan))
+    return check_wire(plan, table_of(plan), BOARDS["uno"])
 
 
 @pytest.mark.parametrize(("first_ticks", "verdict"), [(320, "green"), (319, "red")])

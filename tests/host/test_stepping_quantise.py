@@ -12,11 +12,14 @@ from planarm.errors import TimingError
 from planarm.model.arm import Arm
 from planarm.model.kinematics import forward
 from planarm.stepping.quantise import hysteresis_usteps, quantisation_bound_cm, quantise
-from planarm.stepping.train import MIN_REVERSAL_TICKS, JointSteps, StepTrain, nearest_usteps, require_steppable
+from planarm.stepping.train import JointSteps, StepTrain, least_reversal_ticks, nearest_usteps, require_steppable
 from planarm.trajectory.motion import Trajectory
 from planarm.trajectory.timing import time_path
+from planarm_wire.messages import BOARDS
 
 TICKS_HZ = 16_000_000
+UNO = BOARDS["uno"]
+MIN_REVERSAL_TICKS = least_reversal_ticks(UNO)
 
 
 def position_usteps(train, j, ticks):
@@ -39,7 +42,9 @@ def test_the_arm_always_stands_on_the_nearest_micro_step(seed, cornered, usteps_
     for j, one in enumerate(joints):
         planned = q[:, j] * one.usteps_per_rad
         # Half a tick of rounding at the joint's speed, and the bound for steps that were left out.
-        allowed = 0.5 + 0.5 / TICKS_HZ * np.abs(qd[:, j]).max() * one.usteps_per_rad + hysteresis_usteps(one) + 1e-6
+        allowed = (
+            0.5 + 0.5 / TICKS_HZ * np.abs(qd[:, j]).max() * one.usteps_per_rad + hysteresis_usteps(one, UNO) + 1e-6
+        )
         assert np.abs(position_usteps(train, j, ticks) - planned).max() <= allowed
         assert train.start_usteps[j] == int(
             np.floor(path.evaluate(path.borders_s[:1]).q_rad[0, j] * one.usteps_per_rad + 0.5)
@@ -91,7 +96,7 @@ def test_a_step_forth_and_back_that_is_too_short_is_left_out():
             assert np.diff(train.steps[0].ticks)[0] == pytest.approx(gap_ticks, abs=2)
             assert train.steps[0].directions.tolist() == [1, -1]
         else:
-            assert 0.0 < peak - 0.5 < hysteresis_usteps(one)
+            assert 0.0 < peak - 0.5 < hysteresis_usteps(one, UNO)
 
 
 def test_reversals_are_found_between_gridpoints():
@@ -176,4 +181,4 @@ def test_the_bound_of_quantisation_covers_poses_off_by_half_a_micro_step():
 def test_hysteresis_is_the_way_in_half_the_reversal_time():
     one = joint(acceleration=10.0)
     t_s = 0.5 * MIN_REVERSAL_TICKS / TICKS_HZ
-    assert sqrt(2.0 * hysteresis_usteps(one) / (10.0 * one.usteps_per_rad)) == pytest.approx(t_s)
+    assert sqrt(2.0 * hysteresis_usteps(one, UNO) / (10.0 * one.usteps_per_rad)) == pytest.approx(t_s)

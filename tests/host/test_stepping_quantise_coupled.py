@@ -48,7 +48,7 @@ def test_every_motor_stands_on_its_nearest_micro_step(count, belted):
     for m, axis in enumerate(motor_axes(specs, coupling)):
         after = np.concatenate([[0], np.cumsum(train.steps[m].directions, dtype=np.int64)])
         stands = train.start_usteps[m] + after[np.searchsorted(train.steps[m].ticks, ticks, side="right")]
-        allowed = 0.5 + 0.5 / TICKS_HZ * rates[:, m].max() + hysteresis_usteps(axis) + 1e-6
+        allowed = 0.5 + 0.5 / TICKS_HZ * rates[:, m].max() + hysteresis_usteps(axis, train.board) + 1e-6
         assert np.abs(stands - planned[:, m]).max() <= allowed
     plan = compress(train, Coding.of(motor_axes(specs, coupling)))
     assert expand(plan).end_usteps == train.end_usteps

@@ -27,6 +27,6 @@ def test_the_queue_holds_a_quarter_of_a_second_of_it():
     held_ticks = least_held_ticks(plan.segments)
     assert held_ticks >= QUEUE_HOLDS_S * TICKS_HZ
     table = table_of(plan)
-    reckoned = held_until(table.starts, segment_bytes(table)) - table.starts[1:]
+    reckoned = held_until(table.starts, segment_bytes(table), table.board.queue_bytes) - table.starts[1:]
     full = table.starts[1:] + held_ticks < table.starts[-1]
     assert reckoned[full].min() < held_ticks

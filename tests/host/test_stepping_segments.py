@@ -1,5 +1,7 @@
 """Compression: every rule of the wire and every tolerance, on trains of real motions, random ones and nasty ones."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -9,10 +11,11 @@ from motion_paths import joint, tip_path, tip_points
 from planarm.errors import TimingError
 from planarm.stepping.quantise import quantise
 from planarm.stepping.segments import Coding, compress, expand
-from planarm.stepping.train import MIN_REVERSAL_TICKS, JointSteps, StepTrain
+from planarm.stepping.train import JointSteps, StepTrain, least_reversal_ticks
 from planarm.trajectory.timing import time_path
 from planarm_wire.codec import decode, encode
 from planarm_wire.messages import (
+    BOARDS,
     MAX_INTERVAL_TICKS,
     MAX_SEGMENT_STEPS,
     MAX_SEGMENT_TICKS,
@@ -21,8 +24,10 @@ from planarm_wire.messages import (
     Segments,
 )
 from planarm_wire.steps import expand_moves
+from planarm_wire.wirings import board_of
 
 WITHOUT_FAST_MOTORS = Coding()
+MIN_REVERSAL_TICKS = least_reversal_ticks(BOARDS["uno"])
 NO_STEPS = JointSteps(np.zeros(0, np.int64), np.zeros(0, np.int8))
 
 
@@ -157,10 +162,12 @@ def test_other_tolerances_are_kept(coding):
 
 def test_three_and_four_joints_share_segments():
     rng = np.random.default_rng(4)
-    for joints in (1, 3, 4):
-        steps = [random_nasty_steps(rng) for _ in range(joints)]
-        train = train_of(*steps)
-        made = expand(compress(train))
+    for joints, wiring in ((1, "own"), (3, "own"), (4, "own"), (2, "cnc_shield"), (3, "cnc_shield"), (4, "cnc_shield")):
+        steps = [random_nasty_steps(rng, board_of(joints, wiring)) for _ in range(joints)]
+        train = replace(train_of(*steps), wiring=wiring)
+        plan = compress(train)
+        made = expand(plan)
+        assert {len(segment.moves) for segment in plan.segments} == {plan.board.joints} == {train.board.joints}
         assert made.duration_ticks == train.duration_ticks
         for wanted, one in zip(steps, made.steps, strict=True):
             assert one.directions.tolist() == wanted.directions.tolist()
@@ -199,7 +206,7 @@ def test_a_step_taken_out_of_turn_is_not_taken_twice(seed):
     check_everything(train_of(random_nasty_steps(rng), random_nasty_steps(rng)))
 
 
-def random_nasty_steps(rng):
+def random_nasty_steps(rng, board=BOARDS["uno"]):
     """Gaps of all sizes, as `nasty_steps`, but drawn evenly: Hypothesis seldom finds what needs many odd gaps."""
     count = int(rng.integers(0, 60))
     directions = rng.choice([1, 1, 1, -1], count)
@@ -208,7 +215,7 @@ def random_nasty_steps(rng):
         for _ in range(count)
     ]
     turns = np.diff(directions, prepend=directions[:1]) != 0
-    least = np.where(turns, MIN_REVERSAL_TICKS, 800)
+    least = np.where(turns, least_reversal_ticks(board), max(800, board.min_interval_ticks))
     least[:1] = MIN_DIR_SETUP_TICKS
     return steps_of(least + np.array(spare, np.int64), directions)
 

@@ -11,6 +11,9 @@ from planarm.analysis.channels import map_channels
 from planarm.analysis.timing import PulseLimits, TimingRules, analyse, recorded_schedules
 from planarm_sim import Uno
 from planarm_sim.errors import StoppedError
+from planarm_wire.messages import BOARDS
+
+PINS = BOARDS["uno"].joint_pins
 
 HEADER = Path("/usr/include/simavr/avr/avr_mcu_section.h")
 MISSING = [name for name in ("avr-gcc", "simavr") if shutil.which(name) is None]
@@ -68,10 +71,10 @@ def test_simavrs_recording_is_judged_as_ours(tmp_path):
     rules = TimingRules((PulseLimits(1e-6, 1e-6, 5e-6, 0.65e-6),) * 2)
     reports = {}
     ours = open_capture(tmp_path / "ours.vcd")
-    schedules = recorded_schedules(ours, map_channels(ours.path, ours.channels, []))
+    schedules = recorded_schedules(ours, map_channels(ours.path, ours.channels, [], PINS))
     for name in ("ours.vcd", "simavr.vcd"):
         capture = open_capture(tmp_path / name)
-        reports[name] = analyse(capture, map_channels(capture.path, capture.channels, []), schedules, rules)
+        reports[name] = analyse(capture, map_channels(capture.path, capture.channels, [], PINS), schedules, rules)
         assert [(f.kind, f.joint) for f in reports[name].findings] == [("dir_setup", 1)], name
         assert [joint.steps for joint in reports[name].joints] == [200, 67], name
     mine, theirs = reports["ours.vcd"].joints[0], reports["simavr.vcd"].joints[0]
@@ -111,7 +114,7 @@ def test_the_interrupt_that_held_an_edge_up_is_named_on_the_emulators_own_record
         uno.run(seconds=0.00605)
         uno.write_vcd(tmp_path / f"{name}.vcd", ["D9", "D4"])
         captures[name] = open_capture(tmp_path / f"{name}.vcd")
-    channels = {name: map_channels(one.path, one.channels, []) for name, one in captures.items()}
+    channels = {name: map_channels(one.path, one.channels, [], PINS) for name, one in captures.items()}
     schedules = recorded_schedules(captures["as_planned"], channels["as_planned"])
     report = analyse(captures["late"], channels["late"], schedules, TimingRules((PulseLimits(),), 5.0))
     [finding] = report.findings

@@ -12,7 +12,8 @@ import numpy.typing as npt
 
 from planarm.analysis.step_scan import INTERRUPT_ROLE
 from planarm.errors import CaptureError
-from planarm_wire.messages import DIR_PINS, STEP_PINS
+
+Pins = Sequence[tuple[str, str]]
 
 INTERRUPT_CHANNEL = "isr"
 """The emulator's line of the interrupt that runs; see docs/emulator.md."""
@@ -40,21 +41,22 @@ class ChannelMap:
         return np.array([_role(line) for line in self.lines], np.int64)
 
 
-def map_channels(path: Path, recorded: Sequence[str], words: Sequence[str]) -> ChannelMap:
+def map_channels(path: Path, recorded: Sequence[str], words: Sequence[str], pins: Pins) -> ChannelMap:
     """Decide which channel is which line: by the words given, else by the board's pin names.
 
     Args:
         path: the recording, for messages.
         recorded: its channels.
         words: like "step1=Channel 0" and "dir1=Channel 1"; every joint needs both.
+        pins: the board's STEP and DIR pin of each joint, whose names count without words.
 
     Raises:
         CaptureError: a word is none of these, names no channel, or a joint lacks a line.
     """
-    lines = _from_words(path, recorded, words) if words else _from_pins(recorded)
+    lines = _from_words(path, recorded, words) if words else _from_pins(recorded, pins)
     if not lines:
         raise CaptureError(
-            f"{path}: none of the board's step pins ({', '.join(STEP_PINS)}) is among its channels "
+            f"{path}: none of the board's step pins ({', '.join(step for step, _ in pins)}) is among its channels "
             f"({', '.join(recorded)}); name the lines, as in --map 'step1={recorded[0]}' --map 'dir1=...'"
         )
     joints = max(int(line[-1]) for line in lines)
@@ -67,11 +69,11 @@ def map_channels(path: Path, recorded: Sequence[str], words: Sequence[str]) -> C
     return ChannelMap(tuple(lines.values()), tuple(lines), joints)
 
 
-def _from_pins(recorded: Sequence[str]) -> dict[str, str]:
+def _from_pins(recorded: Sequence[str], pins: Pins) -> dict[str, str]:
     """Take the channels that are named like the board's pins, with or without scopes before them."""
     last_words = {name.rpartition(".")[2]: name for name in recorded}
     found: dict[str, str] = {}
-    for joint, (step, direction) in enumerate(zip(STEP_PINS, DIR_PINS, strict=True), start=1):
+    for joint, (step, direction) in enumerate(pins, start=1):
         if step in last_words and direction in last_words:
             found[f"step{joint}"] = last_words[step]
             found[f"dir{joint}"] = last_words[direction]

@@ -9,7 +9,7 @@ import numpy as np
 
 from planarm.scene import MechanicsSpec, Scene, parse_scene
 from planarm.stepping.check_torque import joint_torques_nm, motor_torque_shares
-from planarm.stepping.train import LARGEST_RATE_HZ
+from planarm.stepping.train import largest_rate_hz
 
 COARSE_TIP_MM = 1.0
 """A tip that jumps by more than this with each micro-step is told."""
@@ -80,7 +80,8 @@ def plausibility(arm: ArmAnswers, number: int) -> list[Remark]:
     step_mm = 10.0 * reach_cm * pi / 180.0 / joint.usteps_per_deg
     rate_hz = joint.max_speed_deg_s * joint.usteps_per_deg
     share = _torque_share(arm, number)
-    fastest = LARGEST_RATE_HZ / joint.usteps_per_deg
+    most_hz = largest_rate_hz(arm.scene().board)
+    fastest = most_hz / joint.usteps_per_deg
     return [
         Remark(
             step_mm > COARSE_TIP_MM,
@@ -88,9 +89,9 @@ def plausibility(arm: ArmAnswers, number: int) -> list[Remark]:
             + ("; more microsteps or gear_ratio make it finer" if step_mm > COARSE_TIP_MM else ""),
         ),
         Remark(
-            rate_hz > LARGEST_RATE_HZ,
-            f"{rate_hz:,.0f} steps/s at full speed, {LARGEST_RATE_HZ:,.0f} are the most"
-            + (f"; at most {fastest:.4g} deg/s" if rate_hz > LARGEST_RATE_HZ else ""),
+            rate_hz > most_hz,
+            f"{rate_hz:,.0f} steps/s at full speed, {most_hz:,.0f} are the most"
+            + (f"; at most {fastest:.4g} deg/s" if rate_hz > most_hz else ""),
         ),
         Remark(
             share > 1.0,

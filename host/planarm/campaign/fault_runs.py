@@ -14,7 +14,7 @@ from __future__ import annotations
 import random
 import tempfile
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -39,7 +39,7 @@ from planarm.stepping.remainder import OUT_OF_STEP_TICKS
 from planarm.stepping.train import JointSteps, StepTrain
 from planarm.stepping.windows import start_stop_ticks
 from planarm.streaming.plan_stream import PLAN_NAME, options_for, record, stream
-from planarm_wire.messages import BAUD, DIR_PINS, STEP_PINS, TICKS_HZ
+from planarm_wire.messages import BAUD, TICKS_HZ
 
 if TYPE_CHECKING:
     from planarm.plan import Plan
@@ -174,8 +174,9 @@ class _Run:
     # -- the pins -----------------------------------------------------------------------------------------------------
 
     def _measured(self) -> list[MeasuredSteps]:
-        board = self.stage.board
-        waves = [[_waveform(board, pin) for pin in pair] for pair in zip(STEP_PINS, DIR_PINS, strict=True)]
+        board, train = self.stage.board, self.stage.train
+        pins = train.board.joint_pins[: len(train.steps)]
+        waves = [[_waveform(board, pin) for pin in pair] for pair in pins]
         return [measure_steps(step, direction) for step, direction in waves]
 
     def _steps(self) -> int:
@@ -200,8 +201,11 @@ class _Run:
     def _judge_speeds(self, measured: Sequence[MeasuredSteps]) -> None:
         scene = self.stage.plan.scene
         axes = motor_axes(scene.joints, scene.coupling)
-        starts = self.stage.train.start_usteps
-        made = StepTrain(starts, tuple(JointSteps(m.ticks, m.directions) for m in measured), self.stage.board.cycle)
+        made = replace(
+            self.stage.train,
+            steps=tuple(JointSteps(m.ticks, m.directions) for m in measured),
+            duration_ticks=self.stage.board.cycle,
+        )
         for number, (axis, steps) in enumerate(zip(axes, made.steps, strict=True), start=1):
             for check in check_gaps(made, axes, number):
                 worst = check.value / check.limit if "acceleration" in check.name else check.limit / check.value
@@ -250,7 +254,7 @@ def _stage(scene: Scene) -> Stage:
     from planarm_sim import Uno  # noqa: PLC0415 - the emulator is loaded where it is used
 
     plan = plan_scene(scene, lambda _stage, _share: None)
-    board = Uno.from_hex(released_image())
+    board = Uno.from_hex(released_image(scene.board.name))
     board.run(seconds=BOOT_S)
     board.clear_edges()
     return Stage(plan, expand(plan.segments), board, board.snapshot())

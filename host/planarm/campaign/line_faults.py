@@ -20,11 +20,13 @@ from planarm.errors import SceneError
 from planarm.link.exchange import stream_plan
 from planarm.link.released_image import released_image
 from planarm.link.sim_transport import SimTransport
+from planarm.link.stream_values import StreamOptions
 from planarm.pipeline import plan_scene
 from planarm.scene import Scene
 from planarm.stepping.expand import expand
 from planarm.stepping.train import StepTrain
-from planarm_wire.messages import DIR_PINS, STEP_PINS, TICKS_HZ
+from planarm_wire.boards import Board
+from planarm_wire.messages import TICKS_HZ
 
 if TYPE_CHECKING:
     from planarm_sim import Uno
@@ -60,7 +62,7 @@ def run_line(scene: Scene, settings: Mapping[str, Value], options: Mapping[str, 
     if fault not in FAULTS:
         raise SceneError(scene.source, "fault", f"{fault!r} given, one of {', '.join(FAULTS)} expected")
     recording = record(scene)
-    board = _board()
+    board = _board(scene.board.name)
     board.restore(recording.board)
     end_cycle = recording.written[0][0] + round(_seconds(options) * TICKS_HZ)
     written = tuple(write for write in recording.written if write[0] < end_cycle)
@@ -99,11 +101,8 @@ def _spoil(data: bytes, begin: int, end: int, fault: str, dice: random.Random) -
 def judge(board: Uno, train: StepTrain, fault: str) -> tuple[str, str, Figures]:
     """Hold the pins' steps against the plan's: a beginning of them, in order and direction, is right."""
     counts, wrong = [], ""
-    for joint, (step, direction) in enumerate(zip(STEP_PINS, DIR_PINS, strict=False)):
-        if joint >= len(train.steps):
-            break
+    for joint, (planned, (step, direction)) in enumerate(zip(train.steps, train.board.joint_pins, strict=False)):
         measured = measure_steps(_waveform(board, step), _waveform(board, direction))
-        planned = train.steps[joint]
         count = len(measured.ticks)
         counts.append(count)
         if count > len(planned.ticks) or not np.array_equal(measured.directions, planned.directions[:count]):
@@ -121,8 +120,8 @@ def _waveform(board: Uno, pin: str) -> Waveform:
 class _Recorder(SimTransport):
     """The emulated line, with what the host wrote and when, and the board as it was before."""
 
-    def __init__(self) -> None:
-        super().__init__(released_image())
+    def __init__(self, board: Board) -> None:
+        super().__init__(released_image(board.name), board=board)
         self.written: list[tuple[int, bytes]] = []
         self.before = self.uno.snapshot()
 
@@ -138,16 +137,16 @@ class _Recorder(SimTransport):
 def record(scene: Scene) -> Recording:
     """Stream the scene's plan to the emulated board once, and keep what the host wrote and when."""
     plan = plan_scene(scene, lambda _stage, _share: None)
-    line = _Recorder()
-    stream_plan(line, plan.segments.segments)
+    line = _Recorder(scene.board)
+    stream_plan(line, plan.segments.segments, options=StreamOptions(wiring=scene.wiring))
     return Recording(expand(plan.segments), tuple(line.written), line.before)
 
 
-@lru_cache(maxsize=1)
-def _board() -> Uno:
+@lru_cache(maxsize=4)
+def _board(name: str) -> Uno:
     from planarm_sim import Uno  # noqa: PLC0415 - the emulator is loaded where it is used
 
-    return Uno.from_hex(released_image())
+    return Uno.from_hex(released_image(name))
 
 
 def _play(board: Uno, sent: list[tuple[int, bytes]], end_cycle: int) -> None:

@@ -21,6 +21,7 @@ from planarm.campaign.task import Row
 from planarm.errors import OutputError, UsageError
 from planarm.link.released_image import released_image
 from planarm.output import writing
+from planarm_wire.messages import BOARDS
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -63,7 +64,7 @@ def about(campaign: Campaign) -> About:
         size=campaign.size,
         spec_sha256=hashlib.sha256((told + axes).encode()).hexdigest(),
         code=f"{planarm.__version__} {_commit()}".strip(),
-        image_sha256=hashlib.sha256(released_image().read_bytes()).hexdigest(),
+        image_sha256=hashlib.sha256(b"".join(released_image(name).read_bytes() for name in BOARDS)).hexdigest(),
     )
 
 

@@ -13,7 +13,9 @@ from typing import TYPE_CHECKING
 from planarm.cli.scenes import tell_first_compile
 from planarm.errors import DeviceFault, EmulatorError
 from planarm.link.released_image import released_image
-from planarm.scene import load_scene
+from planarm.scene import Scene, load_scene
+from planarm_wire.boards import Board
+from planarm_wire.messages import BOARDS
 
 if TYPE_CHECKING:
     from planarm_sim import Bench, Uno
@@ -26,11 +28,13 @@ def execute(options: argparse.Namespace) -> int:
     from planarm_sim.emulate import emulate
     from planarm_sim.errors import SimError
 
-    around = _arm_around(options)
+    scene = load_scene(options.scene) if options.scene else None
+    named = options.board or (scene.board.name if scene else "uno")
+    around = _arm_around(options, scene, BOARDS[named])
     talk = sys.stderr if options.json else sys.stdout
     try:
         result = emulate(
-            options.firmware or released_image(),
+            options.firmware or released_image(named),
             bootloader=options.bootloader,
             link=options.link,
             watch=watch_of(options),
@@ -49,7 +53,7 @@ def execute(options: argparse.Namespace) -> int:
     return DeviceFault.exit_code if result.program_failed else 0
 
 
-def _arm_around(options: argparse.Namespace) -> Callable[[Uno], Bench] | None:
+def _arm_around(options: argparse.Namespace, scene: Scene | None, board: Board) -> Callable[[Uno], Bench] | None:
     """Choose what stands around the board: the scene's arm; else, with our own firmware, a light arm on a desk.
 
     Raises:
@@ -58,10 +62,10 @@ def _arm_around(options: argparse.Namespace) -> Callable[[Uno], Bench] | None:
     from planarm.link.sim_bench import arm_at_its_start, desk_arm_around
 
     faults = Path(options.faults) if options.faults else None
-    if options.scene:
-        return arm_at_its_start(load_scene(options.scene), faults, options.fault_seed)
+    if scene is not None:
+        return arm_at_its_start(scene, faults, options.fault_seed)
     if options.firmware is None and not options.bare:
-        return desk_arm_around(faults, options.fault_seed)
+        return desk_arm_around(board, faults, options.fault_seed)
     if faults is not None:
         raise EmulatorError("--faults needs drivers and an arm around the board: give --scene FILE, too")
     return None

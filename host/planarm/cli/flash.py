@@ -16,7 +16,7 @@ def execute(options: argparse.Namespace) -> int:
     from planarm.link.serial_transport import let_go
     from planarm.link.transport import open_transport
 
-    image = Path(options.image) if options.image else released_image()
+    image = Path(options.image) if options.image else released_image(options.board)
     let_go(options.port)
     flash(options.port, image)
     told: dict[str, object] = {"image": str(image), "verified": True}

@@ -12,6 +12,7 @@ from collections.abc import Sequence
 import planarm
 from planarm.cli.parser import EXIT_CODES, Commands, Parser
 from planarm.errors import OutputError, PlanarmError, UsageError
+from planarm_wire.messages import BOARDS
 
 STOPPED_READING = 141
 """What a shell reports of a program that a closed pipe has ended."""
@@ -191,6 +192,7 @@ def _add_board(commands: Commands) -> None:
     _add_json(command)
     command = commands.add_parser("flash", help="write the released image to an Uno, and verify it", epilog=EXIT_CODES)
     command.add_argument("--port", metavar="DEVICE", required=True, help="the board's device")
+    command.add_argument("--board", choices=tuple(BOARDS), default="uno", help="whose released image (docs/wiring.md)")
     command.add_argument("--image", metavar="HEX", help="another image; it is not asked who it is")
     _add_json(command)
     command = commands.add_parser(
@@ -249,6 +251,7 @@ def _add_envelope(commands: Commands) -> None:
 def _add_emulate(commands: Commands) -> None:
     command = commands.add_parser("emulate", help="run a flash image on the emulated Uno behind a virtual serial port")
     command.add_argument("--firmware", metavar="HEX|ELF", help="the image to run (default: the released firmware)")
+    command.add_argument("--board", choices=tuple(BOARDS), help="whose released image (default: the scene's, or uno)")
     command.add_argument("--bootloader", metavar="HEX|ELF", help="a boot loader, so that avrdude can upload")
     command.add_argument(
         "--scene",
@@ -313,6 +316,7 @@ def _add_timing(commands: Commands) -> None:
     command.add_argument(
         "--map", metavar="LINE=CHANNEL", action="append", help="step1=..., dir1=...; default: pin names"
     )
+    command.add_argument("--board", choices=tuple(BOARDS), help="whose pins' names count (default: the plan's, or uno)")
     command.add_argument("--tolerance-us", type=_positive, default=1.0, metavar="US", help="off time beyond (1)")
     command.add_argument("--junit", metavar="FILE.xml", help="also write the verdict as JUnit XML")
     command.add_argument("--html", metavar="FILE.html", help="also write a page for people")

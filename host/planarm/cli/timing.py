@@ -37,6 +37,7 @@ def execute(options: argparse.Namespace) -> int:
         driver=options.driver,
         channels=tuple(options.map or ()),
         tolerance_us=options.tolerance_us,
+        board=options.board,
     )
     with progress(options.json) as notice:
         found = compare_recordings(names[1], request, notice) if is_diff else judge_recording(request, notice)

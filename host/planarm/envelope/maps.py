@@ -9,7 +9,7 @@ from planarm.model.arm import Arm
 from planarm.model.kinematics import ElbowSide, inverse_2r, tip_jacobian
 from planarm.model.transmission import Transmission
 from planarm.scene import Scene
-from planarm.stepping.train import LARGEST_RATE_HZ
+from planarm.stepping.train import largest_rate_hz
 
 Floats = NDArray[np.float64]
 
@@ -60,7 +60,9 @@ def envelope_maps(scene: Scene, elbow: ElbowSide) -> EnvelopeMaps:
         joint_rates = np.linalg.norm(joints_per_cm, axis=-1)
         motor_rates = np.linalg.norm(Transmission.of(scene).usteps_per_rad @ joints_per_cm, axis=-1)
         speeds = np.array([joint.max_speed_rad_s for joint in scene.joints])
-        largest = np.minimum((speeds / joint_rates).min(axis=-1), (LARGEST_RATE_HZ / motor_rates).min(axis=-1))
+        largest = np.minimum(
+            (speeds / joint_rates).min(axis=-1), (largest_rate_hz(scene.board) / motor_rates).min(axis=-1)
+        )
     return EnvelopeMaps(
         x_cm,
         y_cm,

@@ -21,22 +21,24 @@ POSES_OF_A_PATH = 60
 def scene_task(scene: Scene, margin_cm: float, limits: Limits) -> Task:
     """Return what a scene asks of the optimiser.
 
-    With one elbow side, joint 2 keeps its sign; with "either", both sides are tried at start and goal, and the arm may
-    pass through full stretch. The tip stays in the workspace's rectangle.
+    Where a task gives points, of two links, joint 2 keeps its sign with one elbow side; with "either", both sides are
+    tried at start and goal, and the arm may pass through full stretch. The tip stays in the workspace's rectangle.
 
     Args:
-        scene: the scene, with a two-link arm.
+        scene: the scene.
         margin_cm: least distance of a link's centre line to an obstacle.
         limits: what the joints can.
     """
-    arm = Arm.from_spec(scene.arm)
-    sides = elbow_sides(scene.arm)
+    arm, task, world = Arm.from_spec(scene.arm), scene.task, joint_world(scene, margin_cm)
+    if task.start_rad is None or task.goal_rad is None:
+        world = _one_sided(world, elbow_sides(scene.arm))
     starts, goals = (
-        [inverse_2r(arm, point, side) for side in sides] for point in (scene.task.start_cm, scene.task.goal_cm)
+        [inverse_2r(arm, point, side) for side in elbow_sides(scene.arm)] if angles is None else [np.array(angles)]
+        for point, angles in ((task.start_cm, task.start_rad), (task.goal_cm, task.goal_rad))
     )
     box_cm = np.array([*scene.workspace.x_cm, *scene.workspace.y_cm])
     ends = [(start, goal) for start in starts for goal in goals]
-    return Task(arm, _one_sided(joint_world(scene, margin_cm), sides), limits, ends, box_cm)
+    return Task(arm, world, limits, ends, box_cm)
 
 
 def _one_sided(world: JointWorld, sides: Sequence[str]) -> JointWorld:

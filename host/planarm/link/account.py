@@ -6,6 +6,7 @@ from typing import Any
 from planarm.link.journal import Journal, Kind
 from planarm.link.knock import FAR_AHEAD
 from planarm.link.position import Known, executed_since
+from planarm.link.told_joints import joints_told
 from planarm_wire.codec import decode
 from planarm_wire.errors import WireError
 from planarm_wire.framing import Frame, FrameDecoder
@@ -69,7 +70,7 @@ class Account:
 
 def account_of(journal: Journal) -> Account:
     """Add up a journal's records."""
-    reader = _Reader(Account(journal.about))
+    reader = _Reader(Account(journal.about), joints_told(journal.records))
     for record in journal.records:
         if record.kind is Kind.SENT:
             reader.on_sent(record.data)
@@ -83,8 +84,9 @@ def account_of(journal: Journal) -> Account:
 class _Reader:
     """Follows a journal, frame by frame."""
 
-    def __init__(self, account: Account) -> None:
+    def __init__(self, account: Account, joints: int) -> None:
         self.account = account
+        self._joints = joints
         self._sent, self._received = FrameDecoder(), FrameDecoder()
         self._boot_nonce: int | None = None
         self._hello_seq: int | None = None  # a session was asked for, and the device may not have heard it
@@ -104,7 +106,7 @@ class _Reader:
         if HOLD_CODE in data:
             self.account.rested = False  # it rests soon, but not yet
         for frame in self._sent.feed(data):
-            message = _message(frame)
+            message = self._message(frame)
             if message is None or not isinstance(frame, Frame):
                 continue
             if isinstance(message, Hello):
@@ -134,7 +136,7 @@ class _Reader:
     def on_received(self, data: bytes, t_s: float) -> None:
         """Keep the newest status."""
         for frame in self._received.feed(data):
-            message = _message(frame)
+            message = self._message(frame)
             if isinstance(message, Welcome):
                 self._on_welcome(message)
                 if self.account.before is None:
@@ -172,12 +174,11 @@ class _Reader:
             return False
         return executed_since(account.before, status.ledger) <= account.sent_segments
 
-
-def _message(frame: object) -> Message | None:
-    """Decode a frame; what is none is noise."""
-    if not isinstance(frame, Frame):
-        return None
-    try:
-        return decode(frame.type_code, frame.payload)
-    except WireError:
-        return None
+    def _message(self, frame: object) -> Message | None:
+        """Decode a frame; what is none is noise."""
+        if not isinstance(frame, Frame):
+            return None
+        try:
+            return decode(frame.type_code, frame.payload, self._joints)
+        except WireError:
+            return None

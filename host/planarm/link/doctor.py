@@ -90,6 +90,7 @@ def ask_board(transport: Transport) -> dict[str, object]:
         trips_s.append(transport.clock.now_s() - began_s)
     return {
         "firmware": ".".join(map(str, session.welcome.firmware_version)),
+        "joints": session.welcome.joints,
         "boot_nonce": f"{session.welcome.boot_nonce:#010x}",
         "reset_cause": session.welcome.reset_cause.name.lower(),
         "interrupted": bool(session.welcome.interrupted),

@@ -7,11 +7,13 @@ from enum import Enum
 from typing import Any
 
 from planarm.link.journal import Kind, Record
+from planarm.link.told_joints import joints_told
 from planarm_wire.codec import decode
 from planarm_wire.errors import WireError
 from planarm_wire.framing import Frame, FrameDecoder, FrameError
 from planarm_wire.messages import (
     HOLD_CODE,
+    JOINTS,
     RESERVED,
     TICKS_HZ,
     Fault,
@@ -89,9 +91,12 @@ class Dump:
         self._to_device, self._to_host = FrameDecoder(), FrameDecoder()
         self._in_flight: deque[tuple[int, float, bool]] = deque()  # number expected after it, when, sent once
         self._next_seq: int | None = None
+        self._joints = JOINTS
 
     def lines(self, records: Iterable[Record]) -> Iterator[Line]:
         """Yield a line for each message, note and damage."""
+        records = list(records)
+        self._joints = joints_told(records)
         for record in records:
             if record.kind is Kind.NOTE:
                 told = ", ".join(f"{key} {value}" for key, value in record.note().items())
@@ -120,7 +125,7 @@ class Dump:
 
     def _is_copy(self, frame: Frame, t_s: float | None) -> bool:
         """Whether a frame was sent before; notes when it went out."""
-        if isinstance(_message(frame), Hello):
+        if isinstance(self._message(frame), Hello):
             self._next_seq = (frame.seq + 1) % _SEQUENCE
             self._in_flight.clear()
             return False
@@ -147,7 +152,7 @@ class Dump:
         return ""
 
     def _count(self, found: Frame | FrameError) -> None:
-        figures, message = self.figures, _message(found)
+        figures, message = self.figures, self._message(found)
         if message is None:
             figures.damaged += 1
             return
@@ -160,12 +165,20 @@ class Dump:
                 figures.faults.add(message.fault.name.lower())
 
     def _text(self, found: Frame | FrameError) -> str:
-        message = _message(found)
+        message = self._message(found)
         if isinstance(found, FrameError):
             return str(found)
         if message is None:
             return f"#{found.seq:<3} a frame of unknown form, type {found.type_code:#04x}"
         return f"#{found.seq:<3} {describe(message)}"
+
+    def _message(self, found: Frame | FrameError) -> Message | None:
+        if isinstance(found, FrameError):
+            return None
+        try:
+            return decode(found.type_code, found.payload, self._joints)
+        except WireError:
+            return None
 
 
 def stream_lines(data: bytes, dump: Dump) -> Iterator[Line]:
@@ -213,12 +226,3 @@ def _status(message: Status) -> str:
 
 def _value(value: object) -> str:
     return value.name.lower() if isinstance(value, Enum) else str(value)
-
-
-def _message(found: Frame | FrameError) -> Message | None:
-    if isinstance(found, FrameError):
-        return None
-    try:
-        return decode(found.type_code, found.payload)
-    except WireError:
-        return None

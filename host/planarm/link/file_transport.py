@@ -6,14 +6,15 @@ from planarm.errors import LinkError
 from planarm.link.arm_record import ArmSetup
 from planarm.link.released_image import released_image
 from planarm.link.sim_transport import SimTransport
-from planarm_wire.messages import BAUD
+from planarm_wire.messages import BAUD, BOARDS
 
 
 class FileTransport(SimTransport):
     """An emulated board, and a file with every byte that is sent to it; `planarm dump` reads it."""
 
     def __init__(self, path: str | Path, baud: int = BAUD, setup: ArmSetup | None = None) -> None:
-        super().__init__(released_image(), baud, setup)
+        board = BOARDS["uno"] if setup is None else setup.scene.board
+        super().__init__(released_image(board.name), baud, setup, board=board)
         self._path = Path(path)
         try:
             self._file = self._path.open("wb")

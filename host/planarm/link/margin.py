@@ -15,16 +15,15 @@ from itertools import accumulate
 from planarm_wire.board_budget import (
     LEAST_SHARE,
     LINE_LOAD,
-    READ_TICKS,
-    SLICE_WORK_TICKS,
     STEP_INTERRUPT_TICKS,
     STRETCHED_TICKS,
+    work_ticks,
 )
+from planarm_wire.boards import Board
 from planarm_wire.codec import encoded_bytes
 from planarm_wire.messages import (
     MAX_PAYLOAD_BYTES,
     NEED_UNIT_TICKS,
-    QUEUE_BYTES,
     QUEUE_FRAME_BYTES,
     SLICE_TICKS,
     TICKS_HZ,
@@ -97,7 +96,11 @@ class Margin:
 
 
 def line_margin(
-    segments: Sequence[Segment], sent_segments: int, seen: SeenLine, allowances: Sequence[Allowance] = ()
+    segments: Sequence[Segment],
+    sent_segments: int,
+    seen: SeenLine,
+    board: Board,
+    allowances: Sequence[Allowance] = (),
 ) -> Margin:
     """Hold a plan against the line.
 
@@ -105,9 +108,10 @@ def line_margin(
         segments: the plan's.
         sent_segments: how many are in the queue already.
         seen: what the line was seen to carry.
+        board: that is to execute it.
         allowances: one a segment, or none.
     """
-    supply = _Supply(segments, sent_segments, seen, allowances)
+    supply = _Supply(segments, sent_segments, seen, allowances, board)
     percent = FULL_PERCENT
     if seen.bytes_s is not None and not supply.suffices(FULL_PERCENT):
         fits, percent_fails = 1, FULL_PERCENT
@@ -124,7 +128,14 @@ def line_margin(
 class _Supply:
     """A motion's segments on their way to the device."""
 
-    def __init__(self, segments: Sequence[Segment], sent: int, seen: SeenLine, allowances: Sequence[Allowance]) -> None:
+    def __init__(
+        self,
+        segments: Sequence[Segment],
+        sent: int,
+        seen: SeenLine,
+        allowances: Sequence[Allowance],
+        board: Board,
+    ) -> None:
         sizes = [encoded_bytes(segment) for segment in segments]
         durations = [duration_ticks(segment) for segment in segments]
         self.starts = list(accumulate(durations, initial=0))
@@ -134,7 +145,9 @@ class _Supply:
         self._queued = list(accumulate(queued, initial=0.0))
         self._needs = [NEED_UNIT_TICKS * -(-one.need_ticks // NEED_UNIT_TICKS) for one in allowances]
         self._needs = self._needs or [0.0] * len(segments)
-        self._work = [_work_ticks(one, ticks) for one, ticks in zip(segments, durations, strict=True)]
+        self._board = board
+        joints = sum(any(moves) for moves in zip(*(map(step_count, one.moves) for one in segments), strict=True))
+        self._work = [_work_ticks(board, joints, one, ticks) for one, ticks in zip(segments, durations, strict=True)]
 
     def asked_bytes_s(self) -> float:
         """Return what the line must carry on average up to the segment that is hardest to bring before it starts."""
@@ -154,22 +167,23 @@ class _Supply:
         line = board = 0.0
         running = 0
         for k in range(self._sent, len(self._needs)):
-            begun = bisect_left(self._queued, self._queued[k + 1] - QUEUE_BYTES) - 1
+            begun = bisect_left(self._queued, self._queued[k + 1] - self._board.queue_bytes) - 1
             room = self.starts[begun] / rate if begun >= 0 else 0.0
             line = max(line, room + turn_ticks) + self._line_bytes[k] * ticks_a_byte
             board = max(board, line) + self._work[k] + (0 if percent == FULL_PERCENT else STRETCHED_TICKS)
             path, before = board * rate, running
             while running < k and self.starts[running + 1] <= path:
                 running += 1
-            free = QUEUE_BYTES - (self._queued[k] - self._queued[running])
+            free = self._board.queue_bytes - (self._queued[k] - self._queued[running])
             need = max(self._needs[before : running + 1])
             if free >= MAX_PAYLOAD_BYTES and self.starts[k] - path < need + margin:
                 return False
         return True
 
 
-def _work_ticks(segment: Segment, ticks: int) -> float:
+def _work_ticks(board: Board, joints: int, segment: Segment, ticks: int) -> float:
     """Return how long the board takes to read a segment beside the interrupts of one like it."""
-    steps = sum(step_count(move) for move in segment.moves)
-    load = LINE_LOAD + STEP_INTERRUPT_TICKS * steps / max(ticks, 1)
-    return (READ_TICKS + SLICE_WORK_TICKS * ((ticks - 1) // SLICE_TICKS)) / max(1.0 - load, LEAST_SHARE)
+    costs = STEP_INTERRUPT_TICKS[board.name]
+    stepping = sum(cost * step_count(move) for cost, move in zip(costs, segment.moves, strict=True))
+    load = LINE_LOAD + stepping / max(ticks, 1)
+    return work_ticks(joints, (ticks - 1) // SLICE_TICKS) / max(1.0 - load, LEAST_SHARE)

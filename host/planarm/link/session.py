@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from planarm.errors import DeviceFault, LinkError
 from planarm.link.arq import Ack, ArqCounters, GoBackN, Resent
 from planarm.link.clock_sync import ClockSync, Span
+from planarm_wire.boards import Board
 from planarm_wire.codec import decode, encode, encoded_bytes
 from planarm_wire.errors import WireError
 from planarm_wire.framing import Frame, FrameDecoder, encode_frame
@@ -87,6 +88,7 @@ class Session:
         self.line = LineCounters()
         self.bytes_sent = 0
         self.guarded = False
+        self._board: Board | None = None
         self._arq = GoBackN(next_seq=_HELLO_SEQ + 1)
         self._decoder = FrameDecoder()
         self._output = bytearray()
@@ -241,6 +243,18 @@ class Session:
         """The device's joints; those of the usual board until it has told."""
         return JOINTS if self.welcome is None else self.welcome.joints
 
+    def require_board(self, board: Board) -> None:
+        """Check that the device is such a board, as far as it tells; its answer to CONFIG tells the rest.
+
+        Raises LinkError when it steps another number of joints.
+        """
+        self._board = board
+        if self.joints != board.joints:
+            raise LinkError(
+                f"the device's image steps {self.joints} joints, the plan is for the board {board.name} with"
+                f" {board.joints}: {_flash_for(board)}"
+            )
+
     # -- an open session ----------------------------------------------------------------------------------------------
 
     def _on_reply(self, frame: Frame, now_s: float) -> None:
@@ -303,6 +317,11 @@ class Session:
         if status.refusal != Result.OK:
             name = self._names.get(status.refusal_seq, "a frame")
             words = RESULT_WORDS[status.refusal]
+            if name == "CONFIG" and status.refusal is Result.OUT_OF_RANGE and self._board is not None:
+                raise LinkError(
+                    f"the device's image is not for the wiring {self._board.pin_map!r} of the plan:"
+                    f" {_flash_for(self._board)}, or change board.wiring"
+                )
             raise DeviceFault(
                 f"the device refused {name} (frame {status.refusal_seq}, state {status.state.name.lower()}):"
                 f" {words.text}; {words.fix}"
@@ -330,6 +349,10 @@ class Session:
 def room_of(message: HostMessage) -> int:
     """Return the bytes that a message takes in the device's queue."""
     return encoded_bytes(message) + QUEUE_FRAME_BYTES if isinstance(message, Segments) else 0
+
+
+def _flash_for(board: Board) -> str:
+    return f"flash its image, planarm flash --board {board.name} --port DEVICE"
 
 
 def fault_words(fault: Fault) -> str:

@@ -15,7 +15,7 @@ from planarm.model.kinematics import inverse_2r
 from planarm.model.shapes import Circle, shape_of
 from planarm.model.transmission import Transmission
 from planarm.scene import JointSpec, Obstacle, Scene
-from planarm_wire.messages import DIR_PINS, ENABLE_PIN, STEP_PINS
+from planarm_wire.boards import Board
 
 if TYPE_CHECKING:
     from planarm_sim import Bench, CircleObstacle, DriverWiring, Motor, PolygonObstacle, Rig, Uno
@@ -95,24 +95,25 @@ def arm_at_its_start(scene: Scene, faults: Path | None, fault_seed: int | None) 
     Raises:
         EmulatorError: the start is out of the arm's reach.
     """
-    arm = Arm.from_spec(scene.arm)
-    q_rad = inverse_2r(arm, scene.task.start_cm, "down" if scene.arm.elbow == "down" else "up")
+    arm, task = Arm.from_spec(scene.arm), scene.task
+    if task.start_rad is not None:
+        q_rad = np.array(task.start_rad)
+    else:
+        q_rad = inverse_2r(arm, task.start_cm, "down" if scene.arm.elbow == "down" else "up")
     if np.isnan(q_rad).any():
-        raise EmulatorError(f"{scene.source}: task.start_cm: {list(scene.task.start_cm)} is out of the arm's reach")
+        raise EmulatorError(f"{scene.source}: task.start_cm: {list(task.start_cm)} is out of the arm's reach")
     usteps = tuple(int(n) for n in np.floor(Transmission.of(scene).usteps(q_rad) + 0.5))
     return lambda uno: build_bench(uno, ArmSetup(scene, usteps, faults, fault_seed))[0]
 
 
-def desk_arm_around(faults: Path | None, fault_seed: int | None) -> Callable[[Uno], Bench]:
-    """Return what puts a light arm around a board that the firmware drives: two A4988 on its pins, 1/16 steps."""
+def desk_arm_around(board: Board, faults: Path | None, fault_seed: int | None) -> Callable[[Uno], Bench]:
+    """Return what puts a light arm around a board that the firmware drives: A4988 on its pins, 1/16 steps."""
 
     def put(uno: Uno) -> Bench:
         from planarm_sim import Bench, DriverWiring, desk_arm, driver_row  # noqa: PLC0415
 
         row = driver_row("a4988")
-        drivers = [
-            DriverWiring(row, step, direction, ENABLE_PIN) for step, direction in zip(STEP_PINS, DIR_PINS, strict=True)
-        ]
+        drivers = [DriverWiring(row, step, direction, board.enable_pin) for step, direction in board.joint_pins]
         bench = Bench(uno, desk_arm(len(drivers)), drivers)
         _let_loose(bench, faults, fault_seed)
         return bench
@@ -158,12 +159,13 @@ def rig_of(scene: Scene, start_usteps: tuple[int, ...]) -> Rig:
 
 
 def drivers_of(scene: Scene) -> list[DriverWiring]:
-    """Return the scene's drivers on the pins of the firmware; joints beyond its pins have none."""
+    """Return the scene's drivers on the pins of its board."""
     from planarm_sim import DriverWiring, driver_row  # noqa: PLC0415
 
+    board = scene.board
     return [
-        DriverWiring(driver_row(joint.driver), step, direction, ENABLE_PIN, microsteps=joint.microsteps)
-        for joint, step, direction in zip(scene.joints, STEP_PINS, DIR_PINS, strict=False)
+        DriverWiring(driver_row(joint.driver), step, direction, board.enable_pin, microsteps=joint.microsteps)
+        for joint, (step, direction) in zip(scene.joints, board.joint_pins, strict=False)
     ]
 
 

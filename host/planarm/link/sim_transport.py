@@ -16,7 +16,8 @@ from planarm.errors import HostKilledError, LinkError
 from planarm.link.arm_record import ArmSetup
 from planarm.link.clock import Clock
 from planarm.link.sim_bench import SimArm, build_bench
-from planarm_wire.messages import BAUD, DIR_PINS, ENABLE_PIN, STEP_PINS, TICKS_HZ
+from planarm_wire.boards import Board
+from planarm_wire.messages import BAUD, BOARDS, TICKS_HZ
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -53,7 +54,7 @@ class SimTransport:
     """A line to an Uno emulated from a flash image; `pins` shows its edges, `uno` is the board itself.
 
     With a setup drivers, motors and an arm stand around it, and `arm` shows what they do. `usb` is "direct", or "16u2"
-    with the delays and limits of the board's USB bridge.
+    with the delays and limits of the board's USB bridge. `board` says how the image is wired.
     """
 
     def __init__(
@@ -62,6 +63,7 @@ class SimTransport:
         baud: int = BAUD,
         setup: ArmSetup | None = None,
         usb: Literal["direct", "16u2"] = "direct",
+        board: Board = BOARDS["uno"],
     ) -> None:
         from planarm_sim import SimError, Uno  # noqa: PLC0415 - brings Numba, which only emulation needs
 
@@ -76,7 +78,7 @@ class SimTransport:
             self._machine, self._faults = build_bench(self.uno, setup)
             self.arm = SimArm(self._machine, self._faults)
         self.clock: Clock = EmulatorClock(self._machine)
-        self.pins = EmulatorPins(self.uno)
+        self.pins = EmulatorPins(self.uno, board)
         self._received = bytearray()
         self._nonces = count(1)
         self._open = True
@@ -139,8 +141,9 @@ class SimTransport:
 class EmulatorPins:
     """The emulated board's pins."""
 
-    def __init__(self, uno: "Uno") -> None:
+    def __init__(self, uno: "Uno", board: Board) -> None:
         self._uno = uno
+        self._board = board
 
     def edges(self, pin: str) -> "NDArray[Any]":
         """Edges of `pin` since power-up, as a structured array (cycle int64, level uint8)."""
@@ -148,7 +151,7 @@ class EmulatorPins:
 
     def write_vcd(self, path: Path) -> None:
         """Write the waveforms of STEP, DIR and ENABLE pins since power-up to a VCD file."""
-        self._uno.write_vcd(path, (*STEP_PINS, *DIR_PINS, ENABLE_PIN))
+        self._uno.write_vcd(path, self._board.driver_pins)
 
 
 def _cycle_after(t_s: float) -> float:

@@ -26,7 +26,6 @@ from planarm.link.stream_values import AT_EASE, Joining, Phase, StreamOptions, S
 from planarm_wire.codec import encoded_bytes
 from planarm_wire.messages import (
     HOLD_CODE,
-    QUEUE_BYTES,
     QUEUE_FRAME_BYTES,
     TICKS_HZ,
     Clear,
@@ -45,6 +44,7 @@ from planarm_wire.messages import (
 )
 from planarm_wire.rates import Allowance
 from planarm_wire.steps import duration_ticks, is_last
+from planarm_wire.wirings import board_of
 
 __all__ = ["AT_EASE", "PERCENT", "Joining", "Phase", "Stream", "StreamOptions", "StreamProgress", "config_of"]
 
@@ -90,6 +90,7 @@ class Stream:
         self._session = session
         self._segments = tuple(segments)
         self._options = options or StreamOptions()
+        self._board = board_of(len(segments[0].moves), self._options.wiring)
         self._on_progress = on_progress
         self._ends_ticks = tuple(accumulate((duration_ticks(segment) for segment in segments), initial=0))
         self._path_time = PathTime(self._segments, self._ends_ticks, self.steps)
@@ -211,6 +212,7 @@ class Stream:
         """Drop what an earlier session left behind; drivers that are enabled with an empty queue are not touched."""
         if not self._session.idle:
             return
+        self._session.require_board(self._board)
         status = self._status
         if self._joining is not None:
             self._join(self._joining, now_s)
@@ -219,7 +221,7 @@ class Stream:
             raise LinkError(
                 "the device is executing the motion of an earlier session; wait until it has ended, then try again"
             )
-        if status.state is State.FAULT or status.free_bytes < QUEUE_BYTES - QUEUE_FRAME_BYTES:
+        if status.state is State.FAULT or status.free_bytes < self._board.queue_bytes - QUEUE_FRAME_BYTES:
             self.cleared_fault = status.fault
             self._session.send(Clear(), now_s)
         self.phase = Phase.CLEARING
@@ -239,7 +241,7 @@ class Stream:
         if not self._session.idle:
             return
         if self._status.state is State.IDLE and self._options.start_stop_ticks:
-            self._session.send(config_of(self._options.start_stop_ticks, self._session.joints), now_s)
+            self._session.send(config_of(self._options.start_stop_ticks, self._board), now_s)
         self.phase = Phase.CONFIGURING
 
     def _enable(self, now_s: float) -> None:
@@ -273,7 +275,7 @@ class Stream:
         if self.sent_segments < len(self._segments):
             seen = self._session.arq_counters.bytes_taken - self._filled_from_bytes
             line = SeenLine.of(seen, now_s - self._filling_since_s, self._session.quickest_s)
-            margin = line_margin(self._segments, self.sent_segments, line, self._options.allowances)
+            margin = line_margin(self._segments, self.sent_segments, line, self._board, self._options.allowances)
             self.margin, self.path_clock_percent = margin, margin.percent
             if margin.percent < PERCENT and self._warn is not None:
                 self._warn(str(margin))

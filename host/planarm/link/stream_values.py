@@ -6,8 +6,18 @@ from enum import Enum, auto
 
 from planarm.link.arq import Resent
 from planarm.link.clock_sync import Span
-from planarm_wire.messages import DEFAULT_START_STOP_TICKS, DEFAULT_WAKE_TICKS, JOINTS, Config, Ledger, PinMap, State
+from planarm_wire.boards import Board
+from planarm_wire.messages import (
+    DEFAULT_START_STOP_TICKS,
+    DEFAULT_WAKE_TICKS,
+    Config,
+    Ledger,
+    PinMap,
+    SetPosition,
+    State,
+)
 from planarm_wire.rates import Allowance
+from planarm_wire.wirings import OWN
 
 AT_EASE = (State.HOLDING, State.HELD, State.STARVED, State.STOPPING)
 """States of a motion in which the path clock does not keep the plan's time."""
@@ -24,7 +34,8 @@ class StreamOptions:
     it was told before. `released_spread_usteps` is how far each joint can move by itself while the drivers are
     released; empty: any way. `start_at_s` is a time of the clock at which the first segment is due: START is given the
     lead that is left until then, at least `lead_ticks`. `ahead_s` limits how much path the device is given beyond what
-    a stop takes, for motions whose rest may be changed on the way; without it the device's queue is filled.
+    a stop takes, for motions whose rest may be changed on the way; without it the device's queue is filled. `wiring`
+    names the pin map of the board that the plan is for.
     """
 
     lead_ticks: int = 160_000
@@ -34,6 +45,7 @@ class StreamOptions:
     released_spread_usteps: tuple[int, ...] = ()
     start_at_s: float | None = None
     ahead_s: float | None = None
+    wiring: str = OWN
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,7 +108,12 @@ class Phase(Enum):
     DONE = auto()
 
 
-def config_of(start_stop_ticks: Sequence[int], joints: int = JOINTS) -> Config:
-    """Return the own wiring of a device with so many joints and these start-stop intervals; further joints rest."""
-    told = (*start_stop_ticks, *(DEFAULT_START_STOP_TICKS,) * (joints - len(start_stop_ticks)))
-    return Config(PinMap.OWN, joints, 0, 0, 0, DEFAULT_WAKE_TICKS, 0, told)
+def config_of(start_stop_ticks: Sequence[int], board: Board) -> Config:
+    """Return what a board is told of its wiring and the motors' start-stop intervals; further joints rest."""
+    told = (*start_stop_ticks, *(DEFAULT_START_STOP_TICKS,) * (board.joints - len(start_stop_ticks)))
+    return Config(PinMap[board.pin_map.upper()], board.joints, 0, 0, 0, DEFAULT_WAKE_TICKS, 0, told)
+
+
+def position_of(usteps: Sequence[int], joints: int) -> SetPosition:
+    """Return what tells a device with so many joints where the motors stand; those that the arm lacks are at 0."""
+    return SetPosition((*usteps, *(0,) * (joints - len(usteps))))

@@ -3,6 +3,7 @@
 ==============================  =====================================================================
 ``sim://``                      the emulated Uno in this process, in virtual time, with the released image
 ``sim://?image=PATH``           the same with another flash image (Intel HEX)
+``sim://?board=NAME``           the same with a board's released image; without it the scene's, or uno
 ``sim://?usb=16u2``             the same with the delays and limits of the board's USB bridge
 ``sim://?isr=1``                the same, its waveforms tell which interrupt runs (`isr`); about three times slower
 ``/dev/ttyACM0``, ``COM3``      a serial port or a pty
@@ -20,7 +21,7 @@ from urllib.parse import parse_qs, urlsplit
 from planarm.errors import LinkError
 from planarm.link.arm_record import ArmSetup, ArmTrace
 from planarm.link.clock import Clock
-from planarm_wire.messages import BAUD
+from planarm_wire.messages import BAUD, BOARDS
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -138,13 +139,15 @@ def _open_emulator(url: str, baud: int, setup: ArmSetup | None) -> Transport:
     kinds: dict[str, Literal["direct", "16u2"]] = {"direct": "direct", "16u2": "16u2"}
     usb = kinds.get(options.get("usb", ["direct"])[-1])
     isr = {"0": False, "1": True}.get(options.get("isr", ["0"])[-1])
-    if parts.netloc or parts.path or set(options) - {"image", "usb", "isr"} or usb is None or isr is None:
+    named = options.get("board", ["uno" if setup is None else setup.scene.board.name])[-1]
+    known = {"image", "board", "usb", "isr"}
+    if parts.netloc or parts.path or set(options) - known or usb is None or isr is None or named not in BOARDS:
         raise LinkError(
-            f"port {url!r}: the emulator takes sim://, sim://?image=PATH, sim://?usb=16u2, sim://?isr=1, "
-            "or several of these by &"
+            f"port {url!r}: the emulator takes sim://, sim://?image=PATH, sim://?board=NAME with one of"
+            f" {', '.join(BOARDS)}, sim://?usb=16u2, sim://?isr=1, or several of these by &"
         )
     images = options.get("image")
-    line = SimTransport(images[-1] if images else released_image(), baud, setup, usb)
+    line = SimTransport(images[-1] if images else released_image(named), baud, setup, usb, BOARDS[named])
     if isr:
         line.uno.observe()
     return line

@@ -16,13 +16,14 @@ from planarm.errors import DeviceFault, LinkError, SceneError
 from planarm.link.exchange import open_session, request
 from planarm.link.positions import Positions
 from planarm.link.session import Session, fault_words
-from planarm.link.stream import config_of
+from planarm.link.stream_values import config_of, position_of
 from planarm.link.transport import Transport
 from planarm.model.transmission import Transmission, motor_axes
 from planarm.plan_file import arm_hash
 from planarm.scene import JointSpec, LimitSwitchSpec, Scene
+from planarm.stepping.train import least_reversal_ticks
 from planarm.stepping.windows import start_stop_ticks
-from planarm_wire.messages import DEBOUNCE_TICKS, Clear, Enable, Fault, Home, Query, SetPosition, State, Stop
+from planarm_wire.messages import DEBOUNCE_TICKS, Clear, Enable, Fault, Home, Query, State, Stop
 
 WATCH_SWITCHES = 1 << 3
 """CONFIG's option: limit switches are watched."""
@@ -137,6 +138,7 @@ def _meet(transport: Transport, port: str, scene: Scene, positions: Positions) -
             else "homing is for motors that each move one joint; tell the place: 'planarm zero SCENE'",
         )
     session = open_session(transport)
+    session.require_board(scene.board)
     assert session.welcome is not None, "an open session has a welcome"
     return session, positions.how(port, session.welcome.boot_nonce, arm_hash(asdict(scene)))
 
@@ -145,7 +147,7 @@ def _make_ready(transport: Transport, session: Session, scene: Scene) -> None:
     """Tell the device of its motors and switches, and switch its drivers on."""
     if request(transport, session, Query()).state is not State.IDLE:
         request(transport, session, Clear())
-    told = config_of([start_stop_ticks(axis) for axis in motor_axes(scene.joints, scene.coupling)])
+    told = config_of([start_stop_ticks(axis) for axis in motor_axes(scene.joints, scene.coupling)], scene.board)
     request(transport, session, replace(told, options=WATCH_SWITCHES))
     request(transport, session, Enable(1))
 
@@ -173,7 +175,7 @@ def _settle(
     usteps: tuple[int, ...],
 ) -> Homed:
     """Tell the device where its arm stands, and note that it knows."""
-    request(transport, session, SetPosition(usteps))
+    request(transport, session, position_of(usteps, session.joints))
     assert session.welcome is not None, "an open session has a welcome"
     positions.remember(port, session.welcome.boot_nonce, arm_hash(asdict(scene)), HOMED)
     return homed
@@ -195,7 +197,7 @@ def _home_order(scene: Scene, switch: LimitSwitchSpec) -> Home:
     number = switch.joint - 1
     axis = scene.joints[number]
     low, high = scene.arm.joint_limits_rad[number]
-    fast = max(start_stop_ticks(axis), 600)
+    fast = max(start_stop_ticks(axis), least_reversal_ticks(scene.board))
     return Home(
         joint=number,
         positive=int(switch.above != axis.reversed),

@@ -24,13 +24,14 @@ from planarm.link.plan_steps import PlanSteps
 from planarm.link.position import Certainty, Known, Meeting, PositionReport, StreamError, judge
 from planarm.link.recording import RecordingTransport
 from planarm.link.stream import AT_EASE, Joining, StreamProgress
+from planarm.link.stream_values import position_of
 from planarm.model.transmission import motor_axes
 from planarm.plan_file import StoredPlan, load_plan
 from planarm.run_folder.folder import begin_run_folder
 from planarm.scene.rebuild import scene_from_mapping
 from planarm.stepping.remainder import certify_remainder, remainder, steps_left
 from planarm.streaming.plan_stream import JOURNAL_NAME, PLAN_NAME, options_for, record, stream
-from planarm_wire.messages import SetPosition, State, Stop
+from planarm_wire.messages import State, Stop
 
 if TYPE_CHECKING:
     from planarm.link.transport import Transport
@@ -181,6 +182,7 @@ def _stream_what_is_left(
     if made is None:
         raise StreamError("the arm does not stand on the path", report)
     axes = motor_axes(run.scene.joints, run.scene.coupling)
+    made = made[: len(plan.start_usteps)]  # the board's further joints rest
     rest = remainder(plan, made, axes)
     certificate = certify_remainder(run.scene, steps_left(plan, made), rest)
     out = run.folder / RESUMED
@@ -193,4 +195,5 @@ def _stream_what_is_left(
 
 def _tell_position(transport: Transport, usteps: tuple[int, ...], met: Meeting) -> None:
     if met.status.state in (State.IDLE, State.READY):
-        request(transport, open_session(transport), SetPosition(usteps))
+        session = open_session(transport)
+        request(transport, session, position_of(usteps, session.joints))

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from planarm.plan import Findings
 from planarm.stepping.plan import SegmentPlan
 from planarm.stepping.segments import expand
-from planarm_wire.messages import DIR_PINS, STEP_PINS, TICKS_HZ
+from planarm_wire.messages import TICKS_HZ
 
 Floats = NDArray[np.float64]
 Ticks = NDArray[np.int64]
@@ -68,6 +68,6 @@ def width_histogram(pulses: Sequence[tuple[Ticks, Ticks]]) -> dict[str, Any] | N
     return {"edges_us": [float(f"{edge:.6g}") for edge in edges], "counts": counts, "log": False}
 
 
-def pin_names(joint: int) -> str:
-    """Return the pins of a joint, counted from 0, in words."""
-    return f"STEP {STEP_PINS[joint]}, DIR {DIR_PINS[joint]}"
+def pin_names(pins: tuple[str, str]) -> str:
+    """Return the STEP and the DIR pin of a joint in words."""
+    return f"STEP {pins[0]}, DIR {pins[1]}"

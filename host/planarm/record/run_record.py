@@ -18,8 +18,8 @@ from planarm.record.events import events_of
 from planarm.record.histograms import error_histogram, interval_histogram, pin_names, width_histogram
 from planarm.record.outcome import Outcome
 from planarm.scene import Obstacle
-from planarm.workspace.free_map import FreeMap
-from planarm_wire.messages import MIN_INTERVAL_TICKS, SPEC_HASH, STEP_PINS, TICKS_HZ
+from planarm.workspace.free_map import RegionMap
+from planarm_wire.messages import SPEC_HASH, TICKS_HZ
 
 FORMAT = 1
 MOST_CELLS = 160_000
@@ -41,7 +41,7 @@ def run_record(outcome: Outcome) -> dict[str, Any]:
         "error": outcome.error,
         "summary": dict(outcome.summary),
         "limits": _limits(plan),
-        "joints": [pin_names(n) if n < len(STEP_PINS) else "" for n in range(len(scene.joints))],
+        "joints": [pin_names(pins) for pins in scene.board.joint_pins[: len(scene.joints)]],
         "real": None if outcome.seen.arm is None else real_curves(outcome.seen.arm, scene),
         "pins": _pins(outcome),
         "timing": _timing(outcome),
@@ -109,11 +109,11 @@ def _limits(plan: Plan) -> dict[str, Any]:
         "acceleration_deg_s2": rounded(np.degrees([joint.max_acceleration_rad_s2 for joint in joints]), 4),
         "acceleration_share": plan.scene.motion.acceleration_share,
         "torque_percent": 100.0 * plan.scene.motion.torque_share,
-        "step_rate_hz": round(TICKS_HZ / MIN_INTERVAL_TICKS, 1),
+        "step_rate_hz": round(TICKS_HZ / plan.segments.board.min_interval_ticks, 1),
     }
 
 
-def _map(free_map: FreeMap) -> dict[str, Any]:
+def _map(free_map: RegionMap) -> dict[str, Any]:
     """Return the map's regions as runs along its rows: for each region a flat list of row, first column, columns."""
     region = free_map.region
     stride = max(1, int(np.ceil(np.sqrt(region.size / MOST_CELLS))))
@@ -166,7 +166,7 @@ def _timing(outcome: Outcome) -> dict[str, Any]:
     if findings is None or pins is None:
         planned = [joint.ticks for joint in plan.train.steps]
         return {"errors": None, "intervals": interval_histogram(planned), "widths": None}
-    edges = [pins.edges(pin) for pin in STEP_PINS[: len(findings.measured)]]
+    edges = [pins.edges(pin) for pin in plan.segments.board.step_pins[: len(findings.measured)]]
     pulses = [(e["cycle"][e["level"] == 1], e["cycle"][e["level"] == 0]) for e in edges]
     return {
         "errors": error_histogram(plan.segments, findings, outcome.seen.start_tick),

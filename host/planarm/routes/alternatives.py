@@ -18,7 +18,7 @@ from planarm.search.joint_space import tip_points_cm
 from planarm.search.path import Path
 from planarm.trajectory.limits import Limits
 from planarm.trajectory.timing import fastest_motion
-from planarm.workspace.world import clearances_cm
+from planarm.workspace.joint_proof import joint_world, pose_spare_cm
 
 SAMPLES = 4_000
 """Poses along a motion at which its clearance is looked at."""
@@ -93,7 +93,8 @@ def _alternative(scene: Scene, margin_cm: float, way: Way) -> Alternative:
         return Alternative(path, way.route.sides, passes, len(way.route.changes_cm), None, None, str(error))
     trajectory = fastest_motion(route.smooth, Limits.of(scene))
     poses = trajectory.sample(np.linspace(0.0, trajectory.duration_s, SAMPLES))[0]
-    least_cm = float(clearances_cm(route.free_map.world, poses).min()) - 0.5 * scene.arm.link_width_cm
+    bare = joint_world(scene, 0.5 * scene.arm.link_width_cm)
+    least_cm = min(pose_spare_cm(bare, pose) for pose in poses)
     return Alternative(
         route.path,
         way.route.sides,

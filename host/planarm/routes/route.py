@@ -21,7 +21,7 @@ from planarm.smoothing.joint_blend import blend_poses
 from planarm.smoothing.smooth import smooth_path
 from planarm.smoothing.smooth_path import Floats, SmoothPath
 from planarm.workspace.check_task import check_task
-from planarm.workspace.free_map import FreeMap, build_free_map
+from planarm.workspace.free_map import FreeMap, RegionMap, build_free_map, tip_map
 from planarm.workspace.joint_proof import joint_world
 from planarm.workspace.world import FREE, elbow_sides
 
@@ -30,8 +30,8 @@ from planarm.workspace.world import FREE, elbow_sides
 class Route:
     """A path and the smooth path made of it."""
 
-    free_map: FreeMap
-    """Of the path's elbow side; of a route in joint space, of both sides together."""
+    free_map: RegionMap
+    """Of the path's elbow side; of a route in joint space, of both sides together, or of the tip alone."""
     path: Path
     """In tip space the way-points; of a route in joint space the tip's curve, densely."""
     smooth: SmoothPath
@@ -102,10 +102,6 @@ def joint_route(scene: Scene, margin_cm: float, spec: JointSpaceSpec) -> Route:
 
 def roadmap_route(scene: Scene, margin_cm: float, task: RoadmapTask | None = None) -> Route:
     """Return the route along the cheapest way on the scene's roadmap, or on a known one; errors as `find_route`."""
-    if len(scene.arm.link_lengths_cm) != 2:
-        links = len(scene.arm.link_lengths_cm)
-        problem = f"{links} links are searched (docs/mpdstar.md), but motions are made for 2"
-        raise SceneError(scene.source, "arm.link_lengths_cm", problem)
     task = task or RoadmapTask.of(scene, margin_cm)
     began_s = perf_counter()
     answer = task.planner.solve()
@@ -116,7 +112,7 @@ def roadmap_route(scene: Scene, margin_cm: float, task: RoadmapTask | None = Non
 
 
 def route_through(scene: Scene, margin_cm: float, poses_rad: Floats, cost: float) -> Route:
-    """Return the route through configurations of two links, shape (n, 2), joined by free moves that cost `cost`."""
+    """Return the route through configurations, shape (m, joints), joined by free moves that cost `cost`."""
     found = made_route(scene, poses_rad, OBJECTIVES[scene.roadmap.cost], cost, 0.0)
     return smoothed_joint_route(scene, margin_cm, found, 0.0)
 
@@ -128,7 +124,7 @@ def smoothed_joint_route(scene: Scene, margin_cm: float, found: JointRoute, sear
     world = joint_world(scene, margin_cm)
     smooth = blend_poses(poses_rad, Arm.from_spec(scene.arm), world, tolerance_cm, proved=True)
     path = Path.through(tip_points_cm(scene, poses_rad), found.sides[0])
-    return Route(both_sides(scene, margin_cm), path, smooth, search_s, found)
+    return Route(seen_map(scene, margin_cm), path, smooth, search_s, found)
 
 
 def smoothed(scene: Scene, free_map: FreeMap, path: Path) -> SmoothPath:
@@ -144,8 +140,17 @@ def smoothed(scene: Scene, free_map: FreeMap, path: Path) -> SmoothPath:
     )
 
 
-def both_sides(scene: Scene, margin_cm: float) -> FreeMap:
-    """Return a map on which a node is free when either elbow side is: to look at, not to search.
+def seen_map(scene: Scene, margin_cm: float) -> RegionMap:
+    """Return a map to look at, not to search: where an arm has few poses at a point, of these, else of the tip alone.
+
+    Raises:
+        SceneError: the limits of joint 2 leave no pose at all.
+    """
+    return both_sides(scene, margin_cm) if len(scene.joints) == 2 else tip_map(scene, margin_cm)
+
+
+def both_sides(scene: Scene, margin_cm: float) -> RegionMap:
+    """Return a map of two links on which a node is free when either elbow side is.
 
     Raises:
         SceneError: the limits of joint 2 leave no pose at all.

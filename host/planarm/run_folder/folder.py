@@ -19,7 +19,7 @@ from planarm.record.run_record import FORMAT, run_record
 from planarm.report import draw_joint_angles, draw_step_rates, draw_tip_error, draw_workspace
 from planarm.report.page import run_page
 from planarm.run_folder.moving_picture import animate
-from planarm_wire.messages import MIN_INTERVAL_TICKS, TICKS_HZ
+from planarm_wire.messages import TICKS_HZ
 
 if TYPE_CHECKING:
     from planarm.plan import Plan
@@ -126,7 +126,7 @@ def _draw(plan: Plan, workspace: Path, joint_angles: Path, step_rates: Path) -> 
         [joint.ticks for joint in plan.train.steps],
         directions=[joint.directions for joint in plan.train.steps],
         ticks_hz=TICKS_HZ,
-        limit_hz=TICKS_HZ / MIN_INTERVAL_TICKS,
+        limit_hz=TICKS_HZ / plan.segments.board.min_interval_ticks,
         title=scene.name,
     )
 

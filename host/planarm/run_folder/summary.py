@@ -29,7 +29,7 @@ def summarise(
         findings: what the pins showed; None when they cannot be seen (a port that is not in this process).
         arm: what the emulated arm did; None when there is none.
     """
-    by_ledger_usteps = moved_usteps(streamed.ledger_before, streamed.ledger_after)
+    by_ledger_usteps = moved_usteps(streamed.ledger_before, streamed.ledger_after)[: len(plan.scene.joints)]
     net_usteps = by_ledger_usteps if findings is None else tuple(m.net_usteps for m in findings.measured)
     return {
         **planned_figures(plan),

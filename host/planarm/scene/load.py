@@ -6,6 +6,7 @@ from math import radians
 from pathlib import Path
 
 from planarm.errors import SceneError
+from planarm.scene.board import BOARD_KEYS, parse_board
 from planarm.scene.dc_motors import DC_MOTOR_KEYS, parse_dc_motors
 from planarm.scene.joint_space import JOINT_SPACE_KEYS, JointSpaceSpec, read_joint_space
 from planarm.scene.limit_switches import parse_limit_switches
@@ -38,6 +39,7 @@ from planarm.scene.types import (
 ROOT_KEYS = (
     "name",
     "arm",
+    "board",
     "workspace",
     "obstacles",
     "task",
@@ -174,6 +176,7 @@ def scene_from_toml(data: dict[str, object], source: str) -> Scene:
         roadmap=parse_roadmap(root.table("roadmap", ROADMAP_KEYS, optional=True)),
         dc_motors=parse_dc_motors(root.table("dc_motors", DC_MOTOR_KEYS, optional=True), links),
         moving=moving,
+        wiring=parse_board(root.table("board", BOARD_KEYS, optional=True)),
     )
 
 

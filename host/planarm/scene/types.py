@@ -4,6 +4,7 @@ from dataclasses import dataclass, field
 from math import ceil, floor, pi
 from typing import Literal
 
+from planarm.errors import SceneError
 from planarm.scene.dc_motors import DcMotorSpec
 from planarm.scene.joint_space import JointSpaceSpec
 from planarm.scene.limit_switches import LimitSwitchSpec
@@ -12,6 +13,9 @@ from planarm.scene.motor import MotorSpec
 from planarm.scene.moving import MovingSpec, ObstacleMotion
 from planarm.scene.roadmap import RoadmapSpec
 from planarm.scene.task import Point, Range, TaskSpec
+from planarm_wire.boards import Board
+from planarm_wire.errors import WireError
+from planarm_wire.wirings import OWN, board_of
 
 Elbow = Literal["up", "down", "either"]
 Shape = Literal["circle", "square", "diamond", "triangle", "hexagon", "polygon"]
@@ -182,6 +186,22 @@ class Scene:
     """None stands for the usual ones (`DcMotorSpec.usual`)."""
     moving: MovingSpec | None = None
     """How to plan in space and time; None: obstacles rest."""
+    wiring: str = OWN
+    """How the drivers are wired, a name of the wire's pin maps."""
+
+    @property
+    def board(self) -> Board:
+        """The board that makes this arm's motions; its name is that of its flash image.
+
+        Raises:
+            SceneError: no board of this wiring steps so many joints. Such an arm can be searched, not moved.
+        """
+        try:
+            return board_of(len(self.joints), self.wiring)
+        except WireError as error:
+            lengths = list(self.arm.link_lengths_cm)
+            problem = f"{lengths}: {error} (board.wiring): it can be searched, but no motion is made"
+            raise SceneError(self.source, "arm.link_lengths_cm", problem) from error
 
     @property
     def margin_cm(self) -> float:

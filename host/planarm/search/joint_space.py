@@ -48,7 +48,7 @@ class JointRoute:
     """A way in joint space."""
 
     poses_rad: Floats
-    """Shape (n, 2), n >= 1, from start to goal; straight moves between them are proved free."""
+    """Shape (m, joints), m >= 1, from start to goal; straight moves between them are proved free."""
     objective: str
     """What is least, in words."""
     cost: float
@@ -60,9 +60,9 @@ class JointRoute:
     """What the joints' speeds alone ask for; acceleration comes on top."""
     tip_length_cm: float
     changes_cm: tuple[Point, ...]
-    """Where the tip is each time the elbow changes its side."""
+    """Where the tip is each time an elbow changes its side."""
     sides: tuple[ElbowSide, ElbowSide]
-    """The elbow's side at start and goal."""
+    """The first elbow's side at start and goal."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -189,14 +189,14 @@ def _route(scene: Scene, world: JointWorld, costs: Costs, spec: JointSpaceSpec, 
 
 
 def made_route(scene: Scene, poses: Floats, objective: str, cost: float, bound: float) -> JointRoute:
-    """Return a way through poses of shape (n, 2), and what is told of it."""
+    """Return a way through poses of shape (m, joints), and what is told of it."""
     speeds = np.array([joint.max_speed_rad_s for joint in scene.joints])
     tips = tip_points_cm(scene, poses)
     changes = []
     for a, b in pairwise(poses):
-        if (a[1] < 0.0) != (b[1] < 0.0):
-            straight = a + (b - a) * (a[1] / (a[1] - b[1]))
-            x, y = forward(Arm.from_spec(scene.arm), straight)[-1]
+        changing = np.flatnonzero((a[1:] < 0.0) != (b[1:] < 0.0)) + 1
+        for share in np.sort(a[changing] / (a[changing] - b[changing])):
+            x, y = forward(Arm.from_spec(scene.arm), a + share * (b - a))[-1]
             changes.append((float(x), float(y)))
     poses.flags.writeable = False
     turns = np.abs(np.diff(poses, axis=0))
@@ -205,12 +205,17 @@ def made_route(scene: Scene, poses: Floats, objective: str, cost: float, bound: 
         objective=objective,
         cost=cost,
         bound=bound,
-        joint_travel_rad=float(np.hypot(*turns.T).sum()),
+        joint_travel_rad=float(np.linalg.norm(turns, axis=1).sum()),
         time_s=float((turns / speeds).max(axis=1, initial=0.0).sum()),
         tip_length_cm=float(np.hypot(*np.diff(tips, axis=0).T).sum()),
         changes_cm=tuple(changes),
-        sides=("up" if poses[0][1] < 0.0 else "down", "up" if poses[-1][1] < 0.0 else "down"),
+        sides=(_first_side(poses[0]), _first_side(poses[-1])),
     )
+
+
+def _first_side(pose_rad: Floats) -> ElbowSide:
+    """Return the side of a pose's first elbow; an arm of one link has none, and counts as "down"."""
+    return "up" if len(pose_rad) > 1 and pose_rad[1] < 0.0 else "down"
 
 
 def _pose(lattice: JointLattice, node: int) -> tuple[float, float]:

@@ -40,7 +40,7 @@ def certify(
     made = expand(plan)
     axes = motor_axes(scene.joints, scene.coupling)
     table, at = table_of(plan), motor_positions(made)
-    checks = check_wire(plan, table)
+    checks = check_wire(plan, table, scene.board)
     checks += check_board(table, made, scene.link)
     for number in range(1, len(scene.joints) + 1):
         checks += check_counts(train, made, number)

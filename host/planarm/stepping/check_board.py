@@ -12,15 +12,13 @@ from planarm_wire.board_budget import (
     LATEST_READ_TICKS,
     LEAST_SHARE,
     LINE_LOAD,
-    READ_TICKS,
-    SLICE_WORK_TICKS,
     STEP_INTERRUPT_TICKS,
+    work_ticks,
 )
 from planarm_wire.messages import (
     CRC_BYTES,
     HEADER_BYTES,
     HOST_WINDOW_BYTES,
-    QUEUE_BYTES,
     SLICE_TICKS,
     TICKS_HZ,
 )
@@ -51,15 +49,24 @@ def check_board(table: SegmentTable, made: StepTrain, link: LinkSpec) -> list[Ch
     """Check the interrupt load, the line's peak, and that segments come and are read in time."""
     if not len(table.durations):
         return []
-    return [_check_load(made), _check_peak(table, link), *_check_margin(table, link), *_check_supply(table, link)]
+    return [
+        _check_load(table, made),
+        _check_peak(table, link),
+        *_check_margin(table, link),
+        *_check_supply(table, link),
+    ]
 
 
-def _check_load(made: StepTrain) -> Check:
+def _check_load(table: SegmentTable, made: StepTrain) -> Check:
     """Check the share of the processor that interrupts take in every 5 ms, a busy line included."""
-    ticks = np.sort(np.concatenate([steps.ticks for steps in made.steps]))
-    within = np.searchsorted(ticks, ticks + LOAD_WINDOW_TICKS, side="left") - np.arange(len(ticks))
-    most = int(within.max()) if len(ticks) else 0
-    load = LINE_LOAD + STEP_INTERRUPT_TICKS * most / LOAD_WINDOW_TICKS
+    each = STEP_INTERRUPT_TICKS[table.board.name]
+    every = np.concatenate([steps.ticks for steps in made.steps])
+    order = np.argsort(every, kind="stable")
+    ticks = every[order]
+    cost = np.repeat(each[: len(made.steps)], [len(steps.ticks) for steps in made.steps])[order]
+    until = np.concatenate([[0], np.cumsum(cost)])
+    within = until[np.searchsorted(ticks, ticks + LOAD_WINDOW_TICKS, side="left")] - until[:-1]
+    load = LINE_LOAD + (int(within.max()) if len(ticks) else 0) / LOAD_WINDOW_TICKS
     where = _time(int(ticks[within.argmax()])) if len(ticks) else ""
     setting = "joints.microsteps or joints.max_speed_deg_s"
     return at_most("interrupt load in any 5 ms", load, MOST_LOAD, "", where, setting, amber=AMBER_LOAD)
@@ -124,13 +131,14 @@ def _check_peak(table: SegmentTable, link: LinkSpec) -> Check:
 def _check_supply(table: SegmentTable, link: LinkSpec) -> list[Check]:
     """Check that the line brings every segment before it starts, and the board reads it.
 
-    The device holds QUEUE_BYTES of segments, so a segment is sent when those that fill them have begun. Its main
+    The device holds queue_bytes of segments, so a segment is sent when those that fill them have begun. Its main
     program reads them one by one in the time that the interrupts of the running segment leave.
     """
     starts: list[int] = table.starts.tolist()
     line_ticks = (_frame_bytes(table) * BITS_PER_BYTE * TICKS_HZ / link.baud).tolist()
     loads: list[float] = _interrupt_loads(table).tolist()
-    work = (READ_TICKS + SLICE_WORK_TICKS * ((table.durations - 1) // SLICE_TICKS)).tolist()
+    joints = table.counts.shape[1]
+    work = [work_ticks(joints, (ticks - 1) // SLICE_TICKS) for ticks in table.durations.tolist()]
     line_tick = board_tick = 0.0
     line, board = [(float(starts[-1]), 0)], [(float(starts[-1]), 0)]
     before: list[int] = _begun_before(table).tolist()
@@ -158,14 +166,15 @@ def _begun_before(table: SegmentTable) -> Ticks:
     """Return for each segment the last of those that must have begun before the queue has room for it; -1: none."""
     heads = QUEUED_HEAD_BYTES * _share_of_frame(table)
     total = np.concatenate([[0.0], np.cumsum(np.asarray(segment_bytes(table), np.float64) + heads)])
-    begun: Ticks = np.searchsorted(total, total[1:] - QUEUE_BYTES, side="left") - 1
+    begun: Ticks = np.searchsorted(total, total[1:] - table.board.queue_bytes, side="left") - 1
     return begun
 
 
 def _interrupt_loads(table: SegmentTable) -> Floats:
     """Return the share of the processor that interrupts take while each segment runs and the line is busy."""
-    steps: Ticks = table.counts.sum(axis=1)
-    return LINE_LOAD + STEP_INTERRUPT_TICKS * steps / np.maximum(table.durations, 1)
+    each = np.array(STEP_INTERRUPT_TICKS[table.board.name][: table.counts.shape[1]])
+    loads: Floats = LINE_LOAD + table.counts @ each / np.maximum(table.durations, 1)
+    return loads
 
 
 def _time(tick: int) -> str:

@@ -101,7 +101,7 @@ def check_deviation(trajectory: Trajectory, scene: Scene, made: StepTrain, at: M
     checks = []
     for number, axis in enumerate(motor_axes(scene.joints, scene.coupling), start=1):
         worst = int(np.argmax(deviation[:, number - 1]))
-        value, allowed = deviation[worst, number - 1], 0.5 + TIMING_USTEPS + hysteresis_usteps(axis)
+        value, allowed = deviation[worst, number - 1], 0.5 + TIMING_USTEPS + hysteresis_usteps(axis, scene.board)
         where = f"{ticks[worst] / TICKS_HZ:.6f} s"
         checks.append(at_most(f"joint {number} deviation from the plan", value, allowed, "usteps", where))
     return checks

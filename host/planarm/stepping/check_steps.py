@@ -4,8 +4,8 @@ import numpy as np
 
 from planarm.scene import JointSpec
 from planarm.stepping.certificate import Check, at_least, at_most
-from planarm.stepping.train import JointSteps, StepTrain
-from planarm_wire.messages import MIN_DIR_SETUP_TICKS, MIN_INTERVAL_TICKS, TICKS_HZ
+from planarm.stepping.train import JointSteps, StepTrain, least_reversal_ticks
+from planarm_wire.messages import TICKS_HZ
 
 TIMING_SHARE = 0.02
 TIMING_TICKS = 16
@@ -49,7 +49,7 @@ def check_gaps(made: StepTrain, joints: tuple[JointSpec, ...], number: int) -> l
     checks = []
     if (~turns).any():
         fastest = TICKS_HZ / (joint.max_speed_rad_s * joint.usteps_per_rad)
-        limit = max(MIN_INTERVAL_TICKS, int(fastest))  # in whole ticks
+        limit = max(made.board.min_interval_ticks, int(fastest))  # in whole ticks
         least = int(np.argmin(np.where(turns, 1 << 62, gaps)))
         setting = f"joints[{number}].max_speed_deg_s"
         checks.append(
@@ -57,7 +57,7 @@ def check_gaps(made: StepTrain, joints: tuple[JointSpec, ...], number: int) -> l
         )
     if turns.any():
         least = int(np.argmin(np.where(turns, gaps, 1 << 62)))
-        limit = MIN_INTERVAL_TICKS + MIN_DIR_SETUP_TICKS
+        limit = least_reversal_ticks(made.board)
         setting = f"joints[{number}].max_acceleration_deg_s2"
         checks.append(
             at_least(f"joint {number} reversal time", gaps[least], limit, "ticks", _time(steps.ticks[least]), setting)

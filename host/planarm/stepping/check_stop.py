@@ -20,7 +20,7 @@ from planarm.stepping.slowing import LINK_MARGIN_TICKS
 from planarm.stepping.table import SegmentTable, segment_bytes
 from planarm.stepping.train import Floats, Ticks
 from planarm_wire.kernel_cache import kernel
-from planarm_wire.messages import MAX_PAYLOAD_BYTES, QUEUE_BYTES, QUEUE_FRAME_BYTES, SLICE_TICKS, TICKS_HZ
+from planarm_wire.messages import MAX_PAYLOAD_BYTES, QUEUE_FRAME_BYTES, SLICE_TICKS, TICKS_HZ
 from planarm_wire.rates import SHARED_PAYLOAD_BYTES
 
 ROUNDING = 0.02
@@ -103,7 +103,7 @@ def _queue_ends(table: SegmentTable) -> list[int]:
     What runs has left the queue; less than the next message may be empty of it. A frame's head and length take four
     bytes, shared by two segments where their frame is sure to hold both.
     """
-    room = QUEUE_BYTES - MAX_PAYLOAD_BYTES - QUEUE_FRAME_BYTES
+    room = table.board.queue_bytes - MAX_PAYLOAD_BYTES - QUEUE_FRAME_BYTES
     sizes = [int(size) + (2 if 2 * size + 4 <= SHARED_PAYLOAD_BYTES else 4) for size in segment_bytes(table)]
     ends, end, held = [], 0, sizes[0]
     for size in sizes:

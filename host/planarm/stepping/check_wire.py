@@ -7,18 +7,19 @@ import numpy as np
 from planarm.stepping.certificate import Check, at_least, at_most
 from planarm.stepping.plan import SegmentPlan
 from planarm.stepping.table import SegmentTable
+from planarm_wire.boards import Board
 from planarm_wire.messages import (
     MAX_INTERVAL_TICKS,
     MAX_SEGMENT_STEPS,
     MAX_SEGMENT_TICKS,
     MIN_DIR_SETUP_TICKS,
-    MIN_INTERVAL_TICKS,
 )
+from planarm_wire.steps import step_count
 
 
-def check_wire(plan: SegmentPlan, table: SegmentTable) -> list[Check]:
-    """Check every segment against the wire's limits, and the time for DIR before the first steps."""
-    broken = list(_problems(table))
+def check_wire(plan: SegmentPlan, table: SegmentTable, board: Board) -> list[Check]:
+    """Check every segment against the wire's limits on a board, and the time for DIR before the first steps."""
+    broken = [*_other_board(plan, table, board), *_problems(table)]
     flagged = np.flatnonzero(table.is_last).tolist()
     if flagged != [len(plan.segments) - 1][: len(plan.segments)]:
         broken.append(f"segments flagged as last: {flagged}")
@@ -35,6 +36,18 @@ def check_wire(plan: SegmentPlan, table: SegmentTable) -> list[Check]:
     return checks
 
 
+def _other_board(plan: SegmentPlan, table: SegmentTable, board: Board) -> Iterator[str]:
+    """Yield in what the segments are not of the board's form; joints beyond the arm's must rest."""
+    if plan.board != board:
+        yield f"segments made for the board {plan.board.name}, the scene's is {board.name}"
+    joints = table.counts.shape[1]
+    for k, segment in enumerate(plan.segments):
+        if len(segment.moves) != board.joints:
+            yield f"segment {k}: moves of {len(segment.moves)} joints, {board.name} has {board.joints}"
+        elif any(step_count(move) for move in segment.moves[joints:]):
+            yield f"segment {k}: steps of joints that the arm does not have"
+
+
 def _problems(table: SegmentTable) -> Iterator[str]:
     """Yield the wire's limits that segments break."""
     several = table.counts > 1
@@ -45,7 +58,7 @@ def _problems(table: SegmentTable) -> Iterator[str]:
         ((table.durations <= 0) | (table.durations > MAX_SEGMENT_TICKS), "duration {}", table.durations),
         (table.counts > MAX_SEGMENT_STEPS, "{} steps of joint {}", table.counts),
         (
-            several & ((least < MIN_INTERVAL_TICKS) | (most > MAX_INTERVAL_TICKS)),
+            several & ((least < table.board.min_interval_ticks) | (most > MAX_INTERVAL_TICKS)),
             "intervals of joint {1}",
             table.counts,
         ),

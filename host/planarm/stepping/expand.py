@@ -27,4 +27,4 @@ def expand(plan: SegmentPlan) -> StepTrain:
         since_first = (n * interval[run] + n * (n - 1) // 2 * add[run]) >> 16
         signs = np.where(steps_dir & 1, 1, -1).astype(np.int8)
         steps.append(JointSteps((begins + first)[run] + since_first, signs[run]))
-    return StepTrain(plan.start_usteps, tuple(steps), int(durations.sum()))
+    return StepTrain(plan.start_usteps, tuple(steps), int(durations.sum()), plan.wiring)

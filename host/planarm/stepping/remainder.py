@@ -93,6 +93,7 @@ def remainder(plan: SegmentPlan, made: Sequence[int], axes: Sequence[JointSpec])
         duration_ticks=first.duration_ticks + int(starts[-1] - starts[ramp.border]),
         start_usteps=slowed.start_usteps,
         allowances=(*_allowances(first, plan.allowances, starts, ramp), *plan.allowances[ramp.border :]),
+        wiring=plan.wiring,
     )
 
 
@@ -103,6 +104,7 @@ def steps_left(plan: SegmentPlan, made: Sequence[int]) -> StepTrain:
         _standing(whole, made),
         tuple(JointSteps(j.ticks[m:], j.directions[m:]) for j, m in zip(whole.steps, made, strict=True)),
         whole.duration_ticks,
+        whole.wiring,
     )
 
 
@@ -176,7 +178,7 @@ def _slowed(whole: StepTrain, made: Sequence[int], ramp: Ramp, end: int) -> Step
         ticks = LEAD_TICKS + np.floor(ramp.time_of(planned)).astype(np.int64)
         steps.append(JointSteps(ticks, joint.directions[count:until]))
     duration = LEAD_TICKS + int(np.ceil(ramp.t_ticks[-1])) + 1
-    return StepTrain(_standing(whole, made), tuple(steps), duration)
+    return StepTrain(_standing(whole, made), tuple(steps), duration, whole.wiring)
 
 
 def _latest(whole: StepTrain, duration_ticks: int, end: int) -> tuple[int, ...]:
@@ -224,7 +226,7 @@ def certify_remainder(scene: Scene, left: StepTrain, plan: SegmentPlan) -> Certi
     axes = motor_axes(scene.joints, scene.coupling)
     made = expand(plan)
     table, at = table_of(plan), motor_positions(made)
-    checks = [*check_wire(plan, table), *check_board(table, made, scene.link)]
+    checks = [*check_wire(plan, table, scene.board), *check_board(table, made, scene.link)]
     for number, (steps, wanted) in enumerate(zip(made.steps, left.steps, strict=True), start=1):
         differ = 0 if np.array_equal(steps.directions, wanted.directions) else len(wanted.directions)
         checks.append(at_most(f"joint {number} steps that differ from the plan", differ, 0, "steps"))

@@ -33,7 +33,7 @@ def encode(scene: Scene, trajectory: Trajectory, coding: Coding | None = None) -
     Raises:
         TimingError: a joint would have to step faster than the firmware can.
     """
-    train = quantise(trajectory, scene.joints, scene.coupling)
+    train = quantise(trajectory, scene.joints, scene.coupling, scene.wiring)
     plan = compress(train, coding or Coding.of(motor_axes(scene.joints, scene.coupling)))
     durations = [segment.duration_flags >> 1 for segment in plan.segments]
     return train, replace(plan, allowances=allowances(trajectory, scene, durations))
@@ -72,7 +72,7 @@ def go_on(
     """
     coding = Coding.of(motor_axes(scene.joints, scene.coupling))
     old, segments, told = before[0], before[1].segments[:kept], before[1].allowances[:kept]
-    made = [len(joint.ticks) for joint in expand(SegmentPlan(segments, 0, old.start_usteps)).steps]
+    made = [len(joint.ticks) for joint in expand(SegmentPlan(segments, 0, old.start_usteps, wiring=old.wiring)).steps]
 
     def encoded(trajectory: Trajectory) -> tuple[StepTrain, SegmentPlan]:
         train = with_first_steps(old, made, quantise(trajectory, scene.joints, scene.coupling))
@@ -95,7 +95,7 @@ def with_first_steps(old: StepTrain, made: Sequence[int], new: StepTrain) -> Ste
         if not same or (count and np.abs(first.ticks[:count] - rest.ticks[:count]).max() > SAME_TICKS):
             raise TimingError(f"joint {number} makes other steps than before on the part of a motion that stays")
         steps.append(JointSteps(np.concatenate([first.ticks[:count], rest.ticks[count:]]), rest.directions))
-    return StepTrain(old.start_usteps, tuple(steps), new.duration_ticks)
+    return StepTrain(old.start_usteps, tuple(steps), new.duration_ticks, old.wiring)
 
 
 def _until_stops_fit(

@@ -12,7 +12,6 @@ from planarm.stepping.plan import SegmentPlan
 from planarm.stepping.train import StepTrain, Ticks, require_steppable
 from planarm.stepping.windows import EXACT_TO_1_US, Coding, tolerance_ticks, windows_of
 from planarm_wire.messages import Move, Segment
-from planarm_wire.wirings import board_of
 
 __all__ = ["Coding", "SegmentPlan", "compress", "expand"]
 
@@ -34,15 +33,15 @@ def compress(
     """
     require_steppable(train)
     if train.duration_ticks == 0:
-        return SegmentPlan((), 0, train.start_usteps)
+        return SegmentPlan((), 0, train.start_usteps, wiring=train.wiring)
     windows = windows_of(train, coding, latest_ticks)
-    before = expand(SegmentPlan(tuple(kept), 0, train.start_usteps))
+    before = expand(SegmentPlan(tuple(kept), 0, train.start_usteps, wiring=train.wiring))
     made = np.array([len(joint.ticks) for joint in before.steps], np.int64)
     last = np.array([joint.ticks[-1] if len(joint.ticks) else NEVER for joint in before.steps], np.int64)
     begin = before.duration_ticks
     ends, runs = cut(windows, made, last, begin, coding.fast_ticks, train.duration_ticks)
     segments = (*kept, *_segments(train, made.tolist(), [begin, *ends.tolist()], runs))
-    plan = SegmentPlan(segments, train.duration_ticks, train.start_usteps)
+    plan = SegmentPlan(segments, train.duration_ticks, train.start_usteps, wiring=train.wiring)
     _require_same_steps(train, expand(plan), coding)
     return plan
 
@@ -50,7 +49,7 @@ def compress(
 def _segments(train: StepTrain, made: Sequence[int], borders: Sequence[int], runs: Ticks) -> tuple[Segment, ...]:
     """Return the wire's form of the runs; a run's direction is that of its first step in the train."""
     following = list(made)
-    resting = (Move(0),) * (board_of(len(train.steps)).joints - len(train.steps))
+    resting = (Move(0),) * (train.board.joints - len(train.steps))
     segments = []
     for k, (begin, end) in enumerate(pairwise(borders)):
         moves = []

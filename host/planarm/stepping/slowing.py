@@ -61,7 +61,7 @@ def shortfall_ticks(plan: SegmentPlan, table: SegmentTable) -> Floats:
     Where all of what is left is in the queue nothing is missing: the motion ends at rest.
     """
     starts = table.starts
-    held = held_until(starts, segment_bytes(table))
+    held = held_until(starts, segment_bytes(table), table.board.queue_bytes)
     needs = np.array([allowance.need_ticks for allowance in plan.allowances])
     spare = held - last_slices(table) - needs - LINK_MARGIN_TICKS
     return np.where(held < starts[-1], -spare, -float(starts[-1]))
@@ -85,13 +85,14 @@ def missing_road_ticks(plan: SegmentPlan, first: int = 0) -> float | None:
     lacking[:first] = False
     if not lacking.any():
         return None
-    return float((held_until(table.starts, segment_bytes(table)) - last_slices(table))[lacking].mean())
+    held = held_until(table.starts, segment_bytes(table), table.board.queue_bytes)
+    return float((held - last_slices(table))[lacking].mean())
 
 
 def road_ticks(plan: SegmentPlan) -> float:
     """Return the path time that a stop may take in a plan like this, on average; infinite where all of it is held."""
     table = table_of(plan)
-    held = held_until(table.starts, segment_bytes(table))
+    held = held_until(table.starts, segment_bytes(table), table.board.queue_bytes)
     partly = held < table.starts[-1]
     if not partly.any():
         return float("inf")

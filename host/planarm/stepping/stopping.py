@@ -28,7 +28,6 @@ from planarm.trajectory.stretch import torque_changes
 from planarm_wire.kernel_cache import kernel
 from planarm_wire.messages import (
     MAX_PAYLOAD_BYTES,
-    QUEUE_BYTES,
     QUEUE_FRAME_BYTES,
     SLICE_TICKS,
     TICKS_HZ,
@@ -190,9 +189,9 @@ def queued_bytes(segment_bytes: Ticks) -> Ticks:
     return np.asarray(segment_bytes + np.where(alone, HEAD_BYTES, HEAD_BYTES // MESSAGE_SEGMENTS))
 
 
-def held_until(starts: Ticks, segment_bytes: Ticks) -> Ticks:
+def held_until(starts: Ticks, segment_bytes: Ticks, queue_bytes: int) -> Ticks:
     """Return the end of the path that the device holds while each segment runs and its queue is full, in ticks."""
     last = len(segment_bytes)
     total = np.concatenate([[0], np.cumsum(queued_bytes(segment_bytes))])
-    until = np.searchsorted(total, total[1:] + QUEUE_BYTES - UNSURE_BYTES, side="right") - 1
+    until = np.searchsorted(total, total[1:] + queue_bytes - UNSURE_BYTES, side="right") - 1
     return np.asarray(starts[np.minimum(until, last)])

@@ -6,7 +6,7 @@ import numpy as np
 
 from planarm.stepping.plan import SegmentPlan
 from planarm.stepping.train import Ticks
-from planarm_wire.wirings import board_of
+from planarm_wire.boards import Board
 
 
 class SegmentTable(NamedTuple):
@@ -19,6 +19,8 @@ class SegmentTable(NamedTuple):
     first: Ticks
     interval_q16: Ticks
     add_q16: Ticks
+    board: Board
+    """That is to execute them."""
 
     @property
     def last_interval_q16(self) -> Ticks:
@@ -49,7 +51,7 @@ def table_of(plan: SegmentPlan) -> SegmentTable:
     ]
     moves = np.array(rows, np.int64).reshape(len(flags), joints, 4)
     steps_dir, first, interval, add = np.moveaxis(moves, 2, 0)
-    return SegmentTable(flags >> 1, flags & 1, steps_dir >> 1, steps_dir & 1, first, interval, add)
+    return SegmentTable(flags >> 1, flags & 1, steps_dir >> 1, steps_dir & 1, first, interval, add, plan.board)
 
 
 def segment_bytes(table: SegmentTable) -> Ticks:
@@ -59,8 +61,7 @@ def segment_bytes(table: SegmentTable) -> Ticks:
     moves = _varuint_bytes(2 * table.counts + table.positive) + some * _varuint_bytes(table.first)
     zigzag = np.where(table.add_q16 >= 0, 2 * table.add_q16, -2 * table.add_q16 - 1)
     moves = moves + several * (_varuint_bytes(table.interval_q16 >> 8) + _varuint_bytes(zigzag))
-    joints = table.counts.shape[1]
-    resting = board_of(joints).joints - joints  # a byte each
+    resting = table.board.joints - table.counts.shape[1]  # a byte each
     total: Ticks = size + moves.sum(axis=1) + resting
     return total
 

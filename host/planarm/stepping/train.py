@@ -8,17 +8,13 @@ from numpy.typing import ArrayLike, NDArray
 
 from planarm.errors import TimingError
 from planarm.scene import JointSpec
-from planarm_wire.messages import MIN_DIR_SETUP_TICKS, MIN_INTERVAL_TICKS, TICKS_HZ
+from planarm_wire.boards import Board
+from planarm_wire.messages import MIN_DIR_SETUP_TICKS, TICKS_HZ
+from planarm_wire.wirings import OWN, board_of
 
 Ticks = NDArray[np.int64]
 Directions = NDArray[np.int8]
 Floats = NDArray[np.float64]
-
-MIN_REVERSAL_TICKS = MIN_INTERVAL_TICKS + MIN_DIR_SETUP_TICKS
-"""Least time between two steps of one joint in opposite directions: DIR changes in between and has its setup time."""
-
-LARGEST_RATE_HZ = TICKS_HZ / MIN_INTERVAL_TICKS
-"""Most steps of one joint in a second."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -47,16 +43,33 @@ class StepTrain:
         start_usteps: each motor's position before the motion; `model.transmission` says where that puts the joints.
         steps: one entry a motor.
         duration_ticks: length of the motion, later than every step; 0 when nothing moves.
+        wiring: of the board that is to make them, a name of the wire's pin maps.
     """
 
     start_usteps: tuple[int, ...]
     steps: tuple[JointSteps, ...]
     duration_ticks: int
+    wiring: str = OWN
+
+    @property
+    def board(self) -> Board:
+        """The board that is to make the steps."""
+        return board_of(len(self.start_usteps), self.wiring)
 
     @property
     def end_usteps(self) -> tuple[int, ...]:
         """Each joint's position after the motion."""
         return tuple(start + joint.net_usteps for start, joint in zip(self.start_usteps, self.steps, strict=True))
+
+
+def least_reversal_ticks(board: Board) -> int:
+    """Return the least time between two steps of one joint in opposite directions: DIR changes and has its setup."""
+    return board.min_interval_ticks + MIN_DIR_SETUP_TICKS
+
+
+def largest_rate_hz(board: Board) -> float:
+    """Return the most steps of one joint in a second."""
+    return TICKS_HZ / board.min_interval_ticks
 
 
 def nearest_usteps(usteps: ArrayLike) -> NDArray[np.int64]:
@@ -71,13 +84,15 @@ def require_steppable(train: StepTrain, joints: Sequence[JointSpec] | None = Non
     Raises:
         TimingError: a step of a joint follows too soon after the one before it, or after the motion's start.
     """
+    board = train.board
+    reversal_ticks = least_reversal_ticks(board)
     for number, steps in enumerate(train.steps, start=1):
         if not len(steps.ticks):
             continue
         reverses = np.diff(steps.directions) != 0
-        room = np.diff(steps.ticks) - np.where(reverses, MIN_REVERSAL_TICKS, MIN_INTERVAL_TICKS)
+        room = np.diff(steps.ticks) - np.where(reverses, reversal_ticks, board.min_interval_ticks)
         if len(room) and room.min() < 0:
-            raise TimingError(_too_fast(number, steps, int(room.argmin()), joints))
+            raise TimingError(_too_fast(board, number, steps, int(room.argmin()), joints))
         if steps.ticks[0] < MIN_DIR_SETUP_TICKS:
             raise TimingError(
                 f"joint {number} would step {steps.ticks[0]} ticks after the motion's start; its DIR line needs "
@@ -89,25 +104,26 @@ def require_steppable(train: StepTrain, joints: Sequence[JointSpec] | None = Non
             )
 
 
-def _too_fast(number: int, steps: JointSteps, i: int, joints: Sequence[JointSpec] | None) -> str:
+def _too_fast(board: Board, number: int, steps: JointSteps, i: int, joints: Sequence[JointSpec] | None) -> str:
     """Tell where a joint is too fast and what to do about it."""
     gap = int(steps.ticks[i + 1] - steps.ticks[i])
     at_s = steps.ticks[i] / TICKS_HZ
     if steps.directions[i] != steps.directions[i + 1]:
         return (
-            f"joint {number} would reverse within {gap} ticks at {at_s:.6f} s; reversing takes {MIN_REVERSAL_TICKS}: "
-            f"lower joints[{number}].max_acceleration_deg_s2"
+            f"joint {number} would reverse within {gap} ticks at {at_s:.6f} s; reversing takes "
+            f"{least_reversal_ticks(board)} on the board {board.name}: lower joints[{number}].max_acceleration_deg_s2"
         )
     return (
         f"joint {number} would step after {gap} ticks ({TICKS_HZ / max(gap, 1):.0f} steps/s) at {at_s:.6f} s; the "
-        f"firmware needs {MIN_INTERVAL_TICKS} ({LARGEST_RATE_HZ:.0f} steps/s): {slower(number, joints)}"
+        f"board {board.name} needs {board.min_interval_ticks} ({largest_rate_hz(board):.0f} steps/s): "
+        f"{slower(board, number, joints)}"
     )
 
 
-def slower(number: int, joints: Sequence[JointSpec] | None) -> str:
-    """Say which setting slows a joint down to what the firmware can step."""
+def slower(board: Board, number: int, joints: Sequence[JointSpec] | None) -> str:
+    """Say which setting slows a joint down to what the board can step."""
     advice = f"lower joints[{number}].max_speed_deg_s"
     if joints is None:
         return advice
-    fastest_deg_s = np.degrees(LARGEST_RATE_HZ / joints[number - 1].usteps_per_rad)
+    fastest_deg_s = np.degrees(largest_rate_hz(board) / joints[number - 1].usteps_per_rad)
     return f"{advice} to at most {fastest_deg_s:.6g}, or its microsteps or gear_ratio"

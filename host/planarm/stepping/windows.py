@@ -13,13 +13,13 @@ from typing import NamedTuple, Self
 import numpy as np
 
 from planarm.scene import JointSpec
-from planarm.stepping.train import MIN_REVERSAL_TICKS, Directions, JointSteps, StepTrain, Ticks
+from planarm.stepping.train import Directions, JointSteps, StepTrain, Ticks, least_reversal_ticks
+from planarm_wire.boards import Board
 from planarm_wire.kernel_cache import kernel
 from planarm_wire.messages import (
     MAX_INTERVAL_TICKS,
     MAX_SEGMENT_STEPS,
     MIN_DIR_SETUP_TICKS,
-    MIN_INTERVAL_TICKS,
     SLICE_TICKS,
     TICKS_HZ,
 )
@@ -94,17 +94,18 @@ def tolerance_ticks(steps: JointSteps, coding: Coding = EXACT_TO_1_US) -> Ticks:
     return tolerance
 
 
-def least_interval_ticks(steps: JointSteps) -> int:
+def least_interval_ticks(steps: JointSteps, board: Board) -> int:
     """Return the shortest interval between steps in one direction: compression makes none shorter."""
     along = np.diff(steps.ticks)[np.diff(steps.directions) == 0]
-    return int(along.min()) if len(along) else MIN_INTERVAL_TICKS
+    return int(along.min()) if len(along) else board.min_interval_ticks
 
 
 def windows_of(train: StepTrain, coding: Coding = EXACT_TO_1_US, latest_ticks: Sequence[int] = ()) -> Windows:
     """Return the windows of all steps; `latest_ticks` tells how late each joint's last step may be, where given."""
     first = np.cumsum([0, *(len(joint.ticks) for joint in train.steps)], dtype=np.int64)
-    least = np.array([least_interval_ticks(joint) for joint in train.steps], np.int64)
+    least = np.array([least_interval_ticks(joint, train.board) for joint in train.steps], np.int64)
     steps = np.empty((first[-1], 7), np.int64)
+    reversal_ticks = least_reversal_ticks(train.board)
     for j, joint in enumerate(train.steps):
         part = steps[first[j] : first[j + 1]]
         tolerance = tolerance_ticks(joint, coding)
@@ -113,7 +114,7 @@ def windows_of(train: StepTrain, coding: Coding = EXACT_TO_1_US, latest_ticks: S
         part[:, HIGH] = np.minimum(joint.ticks + tolerance, train.duration_ticks - 1)
         if len(part) and j < len(latest_ticks):
             part[-1, HIGH] = min(part[-1, HIGH], latest_ticks[j])
-        _tighten(joint.ticks, joint.directions, least[j], part)
+        _tighten(joint.ticks, joint.directions, least[j], reversal_ticks, part)
         part[:, RUN_END] += first[j]
         start_stop = coding.start_stop_ticks[j] if j < len(coding.start_stop_ticks) else 0
         part[:, FAST] = np.cumsum(np.diff(joint.ticks, prepend=-(1 << 62)) < start_stop)
@@ -121,12 +122,12 @@ def windows_of(train: StepTrain, coding: Coding = EXACT_TO_1_US, latest_ticks: S
 
 
 @kernel
-def _tighten(ticks: Ticks, directions: Directions, least_interval: int, steps: Ticks) -> None:
+def _tighten(ticks: Ticks, directions: Directions, least_interval: int, reversal: int, steps: Ticks) -> None:
     """Fill the other columns of one joint's steps, and tighten their windows."""
     count = ticks.shape[0]
     for n in range(count):
         turns = n == 0 or directions[n] != directions[n - 1]
-        steps[n, GAP] = MIN_REVERSAL_TICKS if turns else least_interval
+        steps[n, GAP] = reversal if turns else least_interval
         steps[n, SETUP] = MIN_DIR_SETUP_TICKS if n == 0 else 0
     for n in range(count - 1, -1, -1):
         if n + 1 < count:

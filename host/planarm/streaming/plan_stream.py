@@ -32,11 +32,13 @@ FULL_STEPS_RELEASED = 2
 
 def options_for(scene: Scene, plan: SegmentPlan) -> StreamOptions:
     """Return how a plan of a scene is streamed."""
-    flat = not scene.mechanics.gravity
+    flat, resting = not scene.mechanics.gravity, plan.board.joints - len(scene.joints)
+    spread = (*(FULL_STEPS_RELEASED * joint.microsteps for joint in scene.joints), *(0,) * resting)
     return StreamOptions(
         allowances=plan.allowances,
         start_stop_ticks=tuple(start_stop_ticks(axis) for axis in motor_axes(scene.joints, scene.coupling)),
-        released_spread_usteps=tuple(FULL_STEPS_RELEASED * j.microsteps for j in scene.joints) if flat else (),
+        released_spread_usteps=spread if flat else (),
+        wiring=plan.wiring,
     )
 
 
@@ -60,7 +62,13 @@ def record(transport: Transport, out: Path, port: str, scene: Scene) -> Recordin
     path = out / JOURNAL_NAME
     path.unlink(missing_ok=True)
     journal = JournalWriter(path)
-    about = {"planarm": planarm.__version__, "spec_hash": SPEC_HASH, "port": port, "baud": scene.link.baud}
+    about = {
+        "planarm": planarm.__version__,
+        "spec_hash": SPEC_HASH,
+        "port": port,
+        "baud": scene.link.baud,
+        "board": scene.board.name,
+    }
     journal.note(transport.clock.now_s(), about)
     return RecordingTransport(transport, journal)
 
@@ -86,5 +94,5 @@ def stream(
     """
     if not certificate.ok:
         raise CertificateError(certificate.explain())
-    options = options or StreamOptions(allowances=plan.allowances)
+    options = options or StreamOptions(allowances=plan.allowances, wiring=plan.wiring)
     return stream_plan(transport, plan.segments, on_progress, options, limits, joining, steer, warn)

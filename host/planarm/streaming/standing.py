@@ -15,13 +15,14 @@ from planarm.errors import LinkError, UsageError
 from planarm.link.exchange import open_session, request
 from planarm.link.positions import Positions
 from planarm.link.session import Session
+from planarm.link.stream_values import position_of
 from planarm.link.transport import Transport
 from planarm.model.arm import Arm
 from planarm.model.kinematics import forward, inverse_2r
 from planarm.model.transmission import Transmission
 from planarm.plan_file import arm_hash
 from planarm.scene import Scene
-from planarm_wire.messages import QUEUE_BYTES, QUEUE_FRAME_BYTES, Clear, Query, SetPosition, State
+from planarm_wire.messages import QUEUE_FRAME_BYTES, Clear, Query, State
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,11 +65,12 @@ def tell(
         LinkError, DeviceFault: it does not take it.
     """
     session = open_session(transport)
+    session.require_board(scene.board)
     status = request(transport, session, Query())
-    left_behind = status.state is State.READY and status.free_bytes < QUEUE_BYTES - QUEUE_FRAME_BYTES
+    left_behind = status.state is State.READY and status.free_bytes < scene.board.queue_bytes - QUEUE_FRAME_BYTES
     if left_behind or status.state is State.FAULT:
         request(transport, session, Clear())
-    request(transport, session, SetPosition(usteps))
+    request(transport, session, position_of(usteps, session.joints))
     assert session.welcome is not None, "an open session has a welcome"
     positions.remember(port, session.welcome.boot_nonce, arm_hash(asdict(scene)), how)
 
@@ -131,7 +133,9 @@ def settle_start(
         DeviceFault: the board refuses.
     """
     if transport.pins is not None:
-        request(transport, open_session(transport), SetPosition(wanted))
+        session = open_session(transport)
+        session.require_board(scene.board)
+        request(transport, session, position_of(wanted, session.joints))
         return
     if vouched:
         tell(transport, port, scene, positions, wanted, "vouched for")

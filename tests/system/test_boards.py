@@ -1,0 +1,159 @@
+"""Arms of one to four links on every wiring, from scene to report on the emulated board and its arm."""
+
+from dataclasses import replace
+from math import radians
+
+import numpy as np
+import pytest
+import shapely
+
+from planarm.errors import LinkError, TimingError
+from planarm.link.exchange import open_session
+from planarm.link.released_image import released_image
+from planarm.link.sim_transport import SimTransport
+from planarm.pipeline import plan_scene, run_scene
+from planarm.plan_file import load_plan
+from planarm.scene import parse_scene
+from planarm_wire.messages import BOARDS, TICKS_HZ
+from planarm_wire.steps import duration_ticks
+
+ARM = """
+[arm]
+link_lengths_cm = {lengths}
+link_width_cm = 1.5
+elbow = "either"
+[board]
+wiring = "{wiring}"
+[workspace]
+x_cm = [-60, 60]
+y_cm = [-30, 60]
+[[obstacles]]
+shape = "polygon"
+vertices_cm = [[26, 22], [34, 24], [30, 34]]
+[task]
+start_deg = {start}
+goal_deg = {goal}
+[planner]
+algorithm = "mpd_star_lite"
+[roadmap]
+nodes = 500
+cost = "travel"
+[mechanics]
+gravity = false
+"""
+JOINT = """
+[[joints]]
+gear_ratio = 5
+microsteps = 8
+max_speed_deg_s = 60
+max_acceleration_deg_s2 = 600
+[joints.motor]
+current_a = 1.7
+"""
+LENGTHS, START, GOAL = (22.0, 16.0, 11.0, 7.0), (0.0, 40.0, -30.0, 20.0), (75.0, 10.0, 25.0, -30.0)
+CASES = [(joints, wiring) for wiring in ("own", "cnc_shield") for joints in (1, 2, 3, 4)]
+MOST_OFF_TICKS = {"uno": 0, "uno_four": 192, "cnc_shield": 160, "cnc_shield_four": 480}
+"""docs/wiring.md's table: how far a step may rise from its tick."""
+
+
+def scene_of(joints, wiring="own", **joint):
+    head = ARM.format(
+        lengths=list(LENGTHS[:joints]), wiring=wiring, start=list(START[:joints]), goal=list(GOAL[:joints])
+    )
+    scene = parse_scene(head + JOINT * joints, f"{joints}-{wiring}.toml")
+    return replace(scene, joints=tuple(replace(one, **joint) for one in scene.joints))
+
+
+def no_notice(_stage, _share):
+    pass
+
+
+def read_back(path):
+    """The motors' positions after each tick with a step, from the file's bytes alone: whole numbers, one by one."""
+    plan = load_plan(path).segments
+    at, events = 0, []
+    for segment in plan.segments:
+        for motor, move in enumerate(segment.moves):
+            for n in range(move.steps_dir >> 1):
+                since = (256 * n * move.interval_q8 + n * (n - 1) // 2 * move.add_q16) // 65536
+                events.append((at + move.first_ticks + since, motor, 1 if move.steps_dir & 1 else -1))
+        at += duration_ticks(segment)
+    position, rows = list(plan.start_usteps), [list(plan.start_usteps)]
+    for _, motor, sign in sorted(events):
+        position[motor] += sign
+        rows.append(list(position))
+    return np.array(rows)
+
+
+def tips_and_links(scene, usteps):
+    """Links of every pose as shapely lines, by complex numbers: kinematics that share nothing with the host's."""
+    zero = np.array([joint.zero_offset_rad for joint in scene.joints])
+    per_rad = np.array(
+        [j.steps_per_rev * j.microsteps * j.gear_ratio / (2 * np.pi) * (-1 if j.reversed else 1) for j in scene.joints]
+    )
+    turns = np.exp(1j * np.cumsum(usteps / per_rad + zero, axis=1))
+    ends = np.cumsum(np.array(scene.arm.link_lengths_cm) * turns, axis=1) + complex(*scene.arm.base_cm)
+    base = np.full((len(ends), 1), complex(*scene.arm.base_cm))
+    points = np.concatenate([base, ends], axis=1)
+    return points[:, -1], shapely.linestrings(np.stack([points.real, points.imag], axis=-1))
+
+
+@pytest.mark.parametrize(("joints", "wiring"), CASES)
+def test_a_scene_runs_on_its_board(joints, wiring, tmp_path):
+    scene = scene_of(joints, wiring)
+    board = scene.board
+    assert (board.joints, board.pin_map) == (2 if joints < 3 else 4, wiring)
+    summary = run_scene(scene, "sim://", tmp_path, no_notice)
+    assert summary["certificate_ok"] and summary["arm_clean"]
+    assert summary["steps_at_pins"] == summary["steps_planned"]
+    assert len(summary["net_usteps"]) == joints
+    assert summary["net_usteps"] == summary["net_usteps_by_ledger"]
+    assert summary["arm_lost_full_steps"] == [0] * joints
+    assert summary["arm_end_tip_error_mm"] < 1.0
+    if joints <= 2:  # a queue of four joints holds little road: such a motion may be slowed down
+        assert summary["max_step_timing_error_ticks"] <= MOST_OFF_TICKS[board.name]
+
+
+@pytest.mark.parametrize(("joints", "wiring"), CASES)
+def test_the_bytes_of_a_plan_keep_the_arm_free_by_another_geometry(joints, wiring, tmp_path):
+    scene = scene_of(joints, wiring)
+    run_scene(scene, "sim://", tmp_path, no_notice)
+    usteps = read_back(tmp_path / "run.plan")
+    tips, links = tips_and_links(scene, usteps)
+    goal = np.exp(1j * np.cumsum([radians(angle) for angle in GOAL[:joints]])) @ np.array(LENGTHS[:joints])
+    assert abs(tips[-1] - goal) < 0.1
+    obstacles = [shapely.Polygon(one.vertices_cm) for one in scene.obstacles]
+    assert min(shapely.distance(links, shape).min() for shape in obstacles) >= 0.5 * scene.arm.link_width_cm
+    steps = np.abs(np.diff(usteps, axis=0))
+    assert (steps.sum(axis=1) == 1).all()
+
+
+@pytest.mark.parametrize(("joints", "wiring"), [(2, "cnc_shield"), (3, "own"), (4, "cnc_shield")])
+def test_a_rate_that_another_board_keeps_is_refused_with_the_board_and_the_setting(joints, wiring):
+    board = scene_of(joints, wiring).board
+    fastest = TICKS_HZ / board.min_interval_ticks
+    scene = scene_of(joints, wiring, microsteps=128, max_speed_rad_s=1.2 * fastest / (200 * 128 * 5 / (2 * np.pi)))
+    quick = replace(scene, motion=replace(scene.motion, torque_share=1.0))
+    quick = replace(quick, joints=tuple(replace(j, max_acceleration_rad_s2=200.0, motor=STRONG) for j in quick.joints))
+    with pytest.raises(TimingError, match=rf"board {board.name} .*steps/s.*max_speed_deg_s to at most"):
+        plan_scene(quick, no_notice)
+
+
+STRONG = replace(scene_of(1).joints[0].motor, holding_torque_nm=50.0, inductance_h=1e-5, rated_current_a=1.7)
+
+
+@pytest.mark.parametrize(
+    ("image", "words"),
+    [
+        ("uno", "image steps 2 joints, the plan is for the board uno_four with 4: flash .*--board uno_four"),
+        ("cnc_shield_four", "image is not for the wiring 'own' of the plan: flash .*--board uno_four"),
+    ],
+)
+def test_a_plan_for_another_board_is_refused_before_anything_moves(image, words, tmp_path):
+    with pytest.raises(LinkError, match=words):
+        run_scene(scene_of(3), f"sim://?board={image}", tmp_path, no_notice)
+
+
+def test_every_board_tells_its_joints():
+    for board in BOARDS.values():
+        assert open_session(SimTransport(released_image(board.name), board=board)).joints == board.joints
