@@ -26,9 +26,10 @@ from scipy.sparse.csgraph import dijkstra
 
 from planarm.experiments.scenes import table1_scene
 from planarm.scene import Algorithm, Moves, PlannerSpec, Point, Scene
-from planarm.search.best_first import ROOM, WHOLE_ROOM, Lattice, Rules, best_first
+from planarm.search.best_first import Rules, best_first
 from planarm.search.grid_search import FEW_MOVES, LEGAL, find_path
 from planarm.search.lattice import make_lattice, make_moves, node_at, open_room
+from planarm.search.legal import ROOM, WHOLE_ROOM, Lattice
 from planarm.search.scratch import BYTES_PER_ENTRY, BYTES_PER_NODE
 from planarm.search.stencils import neighbour_counts, primitive, stencil
 from planarm.workspace.free_map import FreeMap, build_free_map

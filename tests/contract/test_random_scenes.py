@@ -22,7 +22,8 @@ from host_scenes import make_scene, random_obstacles
 from planarm.search.grid_search import find_path
 from planarm.search.stencils import cover, stencil
 from planarm.workspace.free_map import build_free_map
-from planarm.workspace.proof import PROVED, prove_line
+from planarm.workspace.line_proof import prove_line
+from planarm.workspace.proof import PROVED
 from planarm.workspace.world import FREE
 from search_maps import planner
 

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 from scipy.sparse.csgraph import shortest_path
 
-from planarm.search.best_first import CELLS, PROOF
 from planarm.search.costs import move_costs, norm, norm_planes
 from planarm.search.grid_search import find_path
 from planarm.search.lattice import make_lattice, near_room
+from planarm.search.legal import CELLS, PROOF
 from planarm.search.optimum import excess, lower_bound_cells
 from planarm.search.sight import in_sight
 from planarm.search.stencils import cover, stencil

@@ -9,7 +9,8 @@ from planarm.search.endpoints import JOIN_CELLS, endpoint
 from planarm.search.grid_search import find_path
 from planarm.search.result import SearchStatus
 from planarm.workspace.free_map import build_free_map
-from planarm.workspace.proof import PROVED, prove_line
+from planarm.workspace.line_proof import prove_line
+from planarm.workspace.proof import PROVED
 from planarm.workspace.world import FREE
 from search_maps import planner, table1_scene
 

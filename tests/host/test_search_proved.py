@@ -12,14 +12,15 @@ from scipy.sparse.csgraph import dijkstra
 from dense_check import least_clearance_cm
 from host_scenes import make_scene, random_obstacles
 from planarm.scene import Obstacle
-from planarm.search.best_first import line_is_free
 from planarm.search.draw import draw_subset
 from planarm.search.grid_search import find_path
 from planarm.search.lattice import make_lattice, node_at
+from planarm.search.legal import line_is_free
 from planarm.search.result import SearchStatus
 from planarm.search.stencils import DRAWN, cover, stencil
 from planarm.workspace.free_map import build_free_map
-from planarm.workspace.proof import PROVED, prove_line
+from planarm.workspace.line_proof import prove_line
+from planarm.workspace.proof import PROVED
 from planarm.workspace.world import FREE
 from search_maps import EXACT, PLANNERS, planner, table1_scene
 

@@ -11,6 +11,7 @@ from host_scenes import FULL_TURN, make_scene, random_obstacles
 from planarm.model.arm import Arm
 from planarm.model.kinematics import forward, inverse_2r
 from planarm.scene import Obstacle
+from planarm.workspace.line_proof import prove_line
 from planarm.workspace.proof import (
     BLOCKED,
     PROVED,
@@ -21,7 +22,6 @@ from planarm.workspace.proof import (
     motion_bound,
     next_piece,
     prove_curve,
-    prove_line,
 )
 from planarm.workspace.world import build_world, clearances_cm
 
@@ -295,6 +295,18 @@ def test_a_thin_obstacle_between_two_free_ends_is_found():
     assert verdict == BLOCKED
     tip = line_points((40.0, 15.0), (40.0, 5.0), np.array([share]))
     assert spare_cm(scene, world, tip)[0] <= 0.0
+
+
+def test_nothing_is_looked_at_beyond_the_end_of_a_line():
+    """Twice as far each line meets the base, where there is no pose; beside obstacles it takes several pieces."""
+    rng, several = np.random.default_rng(3), 0
+    for _ in range(400):
+        scene = make_scene(random_obstacles(rng, 4), links=(26.0, 26.0), limits=(FULL_TURN[0], (-pi, pi)))
+        world = build_world(scene, 0.0)
+        p0 = random_tip(rng)
+        verdict, _ = prove_line(world, *p0, *(0.5 * p0))
+        several += verdict == PROVED and spare_cm(scene, world, line_points(p0, 0.5 * p0)).min() < 0.5
+    assert several > 5
 
 
 def test_a_move_that_grazes_the_margin_stays_unproved():

@@ -15,7 +15,8 @@ from planarm.search.grid_search import find_path
 from planarm.search.heap import rise, sink
 from planarm.search.path import Path
 from planarm.workspace.free_map import FreeMap
-from planarm.workspace.proof import PROVED, prove_line
+from planarm.workspace.line_proof import prove_line
+from planarm.workspace.proof import PROVED
 from planarm.workspace.world import FREE, ArmWorld
 from planarm_wire.kernel_cache import kernel
 

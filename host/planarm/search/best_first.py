@@ -26,6 +26,19 @@ from numpy.typing import NDArray
 
 from planarm.search.costs import norm
 from planarm.search.draw import draw_subset
+from planarm.search.legal import (
+    NODES,
+    PROOF,
+    ROOM,
+    SHUT,
+    THREE,
+    WHOLE_ROOM,
+    Lattice,
+    Moves,
+    is_legal,
+    memory_for,
+    move_is_legal,
+)
 from planarm.search.open_list import (
     BUCKET,
     EXPANDED,
@@ -39,12 +52,8 @@ from planarm.search.open_list import (
     twice_as_long,
 )
 from planarm.search.scratch import Scratch, borrow, give_back, with_more_entries
-from planarm.workspace.proof import PROVED, prove_line
 from planarm.workspace.world import ArmWorld
 from planarm_wire.kernel_cache import kernel
-
-SHUT, ROOM, WHOLE_ROOM = 0, 1, 2
-"""A node that is not to be entered: not free, or border; a free one; one whose cell is free as a whole."""
 
 REACHED, START, CHECKED = 3, 127, 128
 """The state of a node that was reached by move k is REACHED + k, that of the start START; CHECKED is added where a
@@ -53,54 +62,11 @@ move has been found not legal, so that all further ones are checked at once. Unt
 UNREACHED = 1 << 62
 """g where no way is known: even, like that of an expanded node, and larger than any."""
 
-NODES, CELLS, PROOF = range(3)
-"""What makes a move legal: its end is free; all cells it crosses are, at their nodes; it is proved free as a whole."""
-
-THREE = 3
-"""Moves that can follow one in the open: the same and its neighbours in direction."""
-
 FULL = -2
 """What `expand` returns when the entries may run out of room."""
 
 BUCKET_BITS = 35
 """A bucket is 2^35 units wide, a quarter of a cell: found by measurement; it changes speed, never a length."""
-
-
-class Lattice(NamedTuple):
-    """The nodes row by row, with a border as wide as the longest move so that no move leaves the arrays.
-
-    A node is known by its place in these arrays.
-    """
-
-    room: NDArray[np.uint8]
-    """SHUT, ROOM or WHOLE_ROOM."""
-    width: int
-    """Nodes in a row."""
-    column: int
-    """x of node 0 in cells: a node in its column is at x = column * cell_cm."""
-    row: int
-    """y of node 0 in cells."""
-    cell_cm: float
-
-
-class Moves(NamedTuple):
-    """The stencil, one value for each move."""
-
-    dx: NDArray[np.int64]
-    dy: NDArray[np.int64]
-    jump: NDArray[np.int64]
-    """What the move adds to a node's place in the lattice."""
-    cost: NDArray[np.int64]
-    planes: NDArray[np.int64]
-    """The norm of the stencil, for `planarm.search.costs.norm`."""
-    after: NDArray[np.int64]
-    """Row 0: all moves. Row 1 + k: the THREE that can follow move k in the open."""
-    cover_first: NDArray[np.int64]
-    """Where the move's cells begin in `cover`; one value more than there are moves."""
-    cover: NDArray[np.int64]
-    """The cells that each move crosses, relative to the node that it leaves."""
-    longest: int
-    """The greatest cost of a move."""
 
 
 class Rules(NamedTuple):
@@ -230,10 +196,11 @@ def expand(  # noqa: C901, PLR0912, PLR0915 - one flat loop: a call that hands o
     """
     room, width = lattice.room, lattice.width
     dx, dy, jump, cost, planes, after = moves.dx, moves.dy, moves.jump, moves.cost, moves.planes, moves.after
-    cover_first, cover = moves.cover_first, moves.cover
+    near = memory_for(world) if rules.legal == PROOF else world.obstacles.first_vertex
     queued, below, ring, counts = queue
     mask, every, prune, around = ring.size - 1, jump.size, wide_open.size > 0, rules.around
     made, waiting, bucket, expanded = counts[MADE], counts[WAITING], counts[BUCKET], counts[EXPANDED]
+    legal = rules.legal
     goal_x, goal_y, rows_per_node = goal % width, goal // width, 1.0 / width
     order = after[0].copy()
     best = UNREACHED
@@ -260,14 +227,9 @@ def expand(  # noqa: C901, PLR0912, PLR0915 - one flat loop: a call that hands o
         if best != UNREACHED and from_g + norm(planes, x, y) >= best:
             continue
         came = state[node]
-        if rules.legal != NODES and came < CHECKED and came != START and not (prune and wide_open[node]):
+        if legal != NODES and came < CHECKED and came != START and not (prune and wide_open[node]):
             move = came - REACHED
-            source, least = node - jump[move], rules.legal
-            for i in range(cover_first[move], cover_first[move + 1]):
-                if room[source + cover[i]] < least:
-                    least = 0
-                    break
-            if least == 0 and (rules.legal == CELLS or not line_is_free(lattice, world, source, node)):
+            if not is_legal(lattice, moves, legal, world, near, goal_x + x, goal_y + y, move):
                 move, from_g = next_best_move(lattice, moves, rules, world, node, state, g)
                 state[node] = CHECKED + ROOM if move == NONE else CHECKED + REACHED + move
                 g[node] = UNREACHED
@@ -318,9 +280,10 @@ def expand(  # noqa: C901, PLR0912, PLR0915 - one flat loop: a call that hands o
                 if to_g + 1 >= known:
                     continue
                 # An expanded node's way is legal and others lead on from it: it gives way to a legal one only.
-                held = before >= CHECKED or (known & 1 == 0 and rules.legal != NODES)
-                if held and not move_is_legal(lattice, moves, rules, world, to, k):
-                    continue
+                if before >= CHECKED or (known & 1 == 0 and legal != NODES):
+                    to_x, to_y = goal_x + x + dx[k], goal_y + y + dy[k]
+                    if not is_legal(lattice, moves, legal, world, near, to_x, to_y, k):
+                        continue
             to_f = to_g + norm(planes, x + dx[k], y + dy[k])
             if to_f >= best:
                 continue
@@ -368,7 +331,7 @@ def next_best_move(
             best, best_g = k, through
         if best == NONE:
             return NONE, 0
-        if move_is_legal(lattice, moves, rules, world, node, best):
+        if move_is_legal(lattice, moves, rules.legal, world, node, best):
             return best, best_g
         last_g, last_move = best_g, best
 
@@ -380,35 +343,6 @@ def is_among(values: NDArray[np.int64], count: int, wanted: int) -> bool:
     for i in range(count):
         found = found or values[i] == wanted
     return found
-
-
-@kernel
-def move_is_legal(lattice: Lattice, moves: Moves, rules: Rules, world: ArmWorld, to: int, move: int) -> bool:
-    """Tell whether a move to the node `to` is legal: all cells crossed are as free as asked, or the line is proved."""
-    node = to - moves.jump[move]
-    for i in range(moves.cover_first[move], moves.cover_first[move + 1]):
-        if lattice.room[node + moves.cover[i]] < rules.legal:
-            return rules.legal == PROOF and line_is_free(lattice, world, node, to)
-    return True
-
-
-@kernel
-def line_is_free(lattice: Lattice, world: ArmWorld, a: int, b: int) -> bool:
-    """Tell whether all poses of the straight move between two nodes are proved free; both directions agree."""
-    if b < a:  # the proof divides the line from its first end: fix which one that is
-        a, b = b, a
-    x0, y0 = node_cm(lattice, a)
-    x1, y1 = node_cm(lattice, b)
-    verdict, _ = prove_line(world, x0, y0, x1, y1)
-    return verdict == PROVED
-
-
-@kernel
-def node_cm(lattice: Lattice, node: int) -> tuple[float, float]:
-    """Return the (x, y) of a node."""
-    x = (lattice.column + node % lattice.width) * lattice.cell_cm
-    y = (lattice.row + node // lattice.width) * lattice.cell_cm
-    return x, y
 
 
 def load_kernels(world: ArmWorld) -> None:

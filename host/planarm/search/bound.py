@@ -7,9 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from planarm.scene import PlannerSpec
-from planarm.search.best_first import CELLS, PROOF, Lattice
 from planarm.search.endpoints import JOIN_CELLS, Endpoint
 from planarm.search.lattice import make_lattice, node_at, nodes_cm
+from planarm.search.legal import CELLS, PROOF, Lattice
 from planarm.search.optimum import BORDER, MOST_ASKED, MOST_NODES, lower_bound_cells, optimal_nodes
 from planarm.search.path import Path
 from planarm.workspace.free_map import FreeMap

@@ -11,8 +11,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from planarm.search.best_first import SHUT, Found, Lattice, Moves, Rules, move_is_legal, node_cm
+from planarm.search.best_first import Found, Rules
 from planarm.search.heap import insert, remove_first
+from planarm.search.legal import SHUT, Lattice, Moves, move_is_legal, node_cm
 from planarm.search.open_list import NONE
 from planarm.workspace.world import ArmWorld, cos_beta_at, theta1_at, theta2_at
 from planarm_wire.kernel_cache import kernel
@@ -80,7 +81,7 @@ def _search(
                 continue
             fill_pose(lattice, world, to, first, second)
             through = g[node] + price_of(price, first[to] - first[node], second[to] - second[node])
-            if through >= g[to] or not move_is_legal(lattice, moves, rules, world, to, k):
+            if through >= g[to] or not move_is_legal(lattice, moves, rules.legal, world, to, k):
                 continue
             g[to], before[to] = through, node
             if size == heap_f.size:

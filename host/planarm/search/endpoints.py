@@ -7,7 +7,8 @@ import numpy as np
 
 from planarm.scene import Point
 from planarm.workspace.free_map import FreeMap
-from planarm.workspace.proof import PROVED, prove_line
+from planarm.workspace.line_proof import prove_line
+from planarm.workspace.proof import PROVED
 from planarm.workspace.world import BEYOND_REACH, FREE, INNER_HOLE, LIMIT, OBSTACLE, region_at
 
 ON_NODE_CM = 1e-9

@@ -13,23 +13,13 @@ from typing import Final
 import numpy as np
 
 from planarm.scene import Moves, PlannerSpec, Point
-from planarm.search.best_first import (
-    CELLS,
-    NODES,
-    PROOF,
-    ROOM,
-    WHOLE_ROOM,
-    Found,
-    Lattice,
-    Rules,
-    best_first,
-    load_kernels,
-)
+from planarm.search.best_first import Found, Rules, best_first, load_kernels
 from planarm.search.bound import optimal_path, path_bound_cm
 from planarm.search.costed import Price, cheapest
 from planarm.search.draw import draw_subset
 from planarm.search.endpoints import ON_NODE_CM, Endpoint, endpoint
 from planarm.search.lattice import make_lattice, make_moves, node_at, nodes_cm, open_room
+from planarm.search.legal import CELLS, NODES, PROOF, ROOM, WHOLE_ROOM, Lattice
 from planarm.search.path import Path
 from planarm.search.result import SearchResult, SearchStatus
 from planarm.search.stencils import DRAWN, Offsets, primitive, stencil

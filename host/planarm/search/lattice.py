@@ -5,8 +5,8 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from planarm.search.best_first import ROOM, SHUT, THREE, WHOLE_ROOM, Lattice, Moves
 from planarm.search.costs import move_costs, norm_planes
+from planarm.search.legal import ROOM, SHUT, THREE, WHOLE_ROOM, Lattice, Moves
 from planarm.search.stencils import Offsets, cover
 from planarm.workspace.free_map import FreeMap
 from planarm.workspace.world import FREE

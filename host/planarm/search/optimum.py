@@ -20,9 +20,10 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from planarm.search.best_first import NODES, ROOM, Lattice, Rules, best_first, flood
+from planarm.search.best_first import Rules, best_first, flood
 from planarm.search.costs import UNITS_PER_CELL
 from planarm.search.lattice import make_moves, near_room, open_room
+from planarm.search.legal import NODES, ROOM, Lattice
 from planarm.search.open_list import NONE
 from planarm.search.sight import in_sight
 from planarm.search.stencils import primitive, stencil

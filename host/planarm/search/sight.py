@@ -13,8 +13,9 @@ from math import floor, inf
 import numpy as np
 from numpy.typing import NDArray
 
-from planarm.search.best_first import PROOF, SHUT, WHOLE_ROOM, Lattice
-from planarm.workspace.proof import PROVED, SMALLEST_CM, prove_line_by
+from planarm.search.legal import PROOF, SHUT, WHOLE_ROOM, Lattice
+from planarm.workspace.line_proof import prove_line_by
+from planarm.workspace.proof import PROVED, SMALLEST_CM
 from planarm.workspace.world import ArmWorld
 from planarm_wire.kernel_cache import kernel
 

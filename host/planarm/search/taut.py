@@ -15,7 +15,7 @@ from math import inf, sqrt
 import numpy as np
 from numpy.typing import NDArray
 
-from planarm.search.best_first import SHUT, Lattice
+from planarm.search.legal import SHUT, Lattice
 from planarm.search.sight import in_sight, next_crossing
 from planarm.workspace.world import ArmWorld
 from planarm_wire.kernel_cache import kernel

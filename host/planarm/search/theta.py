@@ -9,8 +9,9 @@ from math import inf
 import numpy as np
 from numpy.typing import NDArray
 
-from planarm.search.best_first import SHUT, Found, Lattice, Moves, Rules, move_is_legal
+from planarm.search.best_first import Found, Rules
 from planarm.search.heap import insert, remove_first
+from planarm.search.legal import SHUT, Lattice, Moves, move_is_legal
 from planarm.search.open_list import NONE
 from planarm.search.sight import in_sight
 from planarm.search.taut import leg_cells
@@ -58,7 +59,7 @@ def _search(
             for k in range(jump.size):
                 source = node - jump[k]
                 through = g[source] + np.sqrt(float(moves.dx[k] ** 2 + moves.dy[k] ** 2))
-                if closed[source] and through < g[node] and move_is_legal(lattice, moves, rules, world, node, k):
+                if closed[source] and through < g[node] and move_is_legal(lattice, moves, rules.legal, world, node, k):
                     g[node], before[node] = through, source
             if before[node] == NONE:
                 continue
@@ -70,7 +71,7 @@ def _search(
         parent_x, parent_y = float(parent % width), float(parent // width)
         for k in range(jump.size):
             to = node + jump[k]
-            if room[to] == SHUT or closed[to] or not move_is_legal(lattice, moves, rules, world, to, k):
+            if room[to] == SHUT or closed[to] or not move_is_legal(lattice, moves, rules.legal, world, to, k):
                 continue
             to_x, to_y = x + moves.dx[k], y + moves.dy[k]
             source, through = parent, g[parent] + leg_cells(parent_x, parent_y, to_x, to_y)

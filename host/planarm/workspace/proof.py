@@ -14,8 +14,9 @@ With theta1 = phi +- beta(r), cos beta = (r^2 + l1^2 - l2^2) / (2 r l1), beta ha
 or at r* = sqrt(l1^2 - l2^2), where link 2 stands at a right angle to the tip's direction. So theta1 changes by at most
 dtheta1 = asin(rho / r_c) + max |beta(r) - beta(r_c)|, and the elbow moves at most 2 l1 sin(dtheta1 / 2).
 
-A line or curve is proved free by covering it with discs, found by bisection. On a straight line an obstacle for which a
-disc is too wide may still be shown to stay clear by what is known of the motion (`planarm.workspace.straight_piece`).
+A curve is proved free by covering it with discs, found by bisection. On a straight line more is known than how far the
+arm may move, namely what its links sweep (`planarm.workspace.straight_sweep`): a line is divided into pieces whose
+sweeps are shown to be free, most often one.
 """
 
 from math import acos, asin, hypot, pi, sin, sqrt
@@ -25,7 +26,6 @@ from numpy.typing import NDArray
 
 from planarm.model.collision import point_segment_distance2, segment_polygon_distance
 from planarm.model.kinematics import ROUNDING_CM
-from planarm.workspace.straight_piece import link1_stays_clear, link2_stays_clear, turning_bounds
 from planarm.workspace.world import (
     FREE,
     ArmWorld,
@@ -48,14 +48,8 @@ PROVED, BLOCKED, UNPROVED = 0, 1, 2
 ALL = -1
 """Stands for the number of obstacles to look at."""
 
-FEW = 8
-"""So many obstacles are looked at for every disc of a line; of more, those that its first disc leaves."""
-
-ENDS_BELOW = 0.2
-"""Where a line takes pieces shorter than this share of it, its ends are looked at."""
-
 SMALLEST_CM = 1e-3
-"""Radius of the smallest disc of a cover: what cannot be proved with it stays unproved."""
+"""Half the length of the shortest piece of a line or curve: what cannot be proved with it stays unproved."""
 
 
 @kernel
@@ -118,7 +112,7 @@ def disc_verdict(world: ArmWorld, x_cm: float, y_cm: float, rho_cm: float) -> in
     BLOCKED means that the pose at the centre is not free. A disc that holds the base is never proved.
     """
     obstacles = world.obstacles
-    return _verdict(
+    return judge_disc(
         world.arm,
         obstacles.centers_cm,
         obstacles.radii_cm,
@@ -129,13 +123,11 @@ def disc_verdict(world: ArmWorld, x_cm: float, y_cm: float, rho_cm: float) -> in
         x_cm - world.arm.base_x_cm,
         y_cm - world.arm.base_y_cm,
         rho_cm,
-        0.0,
-        0.0,
     )
 
 
 @bare_kernel
-def _verdict(
+def judge_disc(
     arm: TwoLinkArm,
     centers_cm: Floats,
     radii_cm: Floats,
@@ -146,13 +138,10 @@ def _verdict(
     x: float,
     y: float,
     rho_cm: float,
-    ux: float,
-    uy: float,
 ) -> int:
     """`disc_verdict` for a disc around (x, y) from the base, with the obstacles' arrays one by one, which is faster.
 
-    Only the obstacles in the first `count` places of `near` are looked at; all when `count` is ALL. With a direction
-    (ux, uy) of length 1 the tip's way is the disc's diameter in it, and more can be proved.
+    Only the obstacles in the first `count` places of `near` are looked at; all when `count` is ALL.
     """
     bx, by, margin, per_l1, per_l2 = arm.base_x_cm, arm.base_y_cm, arm.margin_cm, arm.per_l1, arm.per_l2
     r2 = x * x + y * y
@@ -182,67 +171,11 @@ def _verdict(
             blocked, clear = apart <= margin, apart > margin + moves
         if blocked:
             return BLOCKED
-        if free and not clear and (ux != 0.0 or uy != 0.0):
-            clear = _stays_clear(arm, cx, cy, keep, ex, ey, x, y, ux, uy, r, rho_cm)
         free = free and clear
     if within_limits(arm, bx + ex, by + ey, moves):
         return PROVED if free else UNPROVED
     theta1 = theta1_at(arm, bx + x, by + y, acos(cos_beta_at(arm, r)))
     return BLOCKED if theta1 < arm.theta1_min_rad or theta1 > arm.theta1_max_rad else UNPROVED
-
-
-@bare_kernel
-def _stays_clear(
-    arm: TwoLinkArm,
-    cx: float,
-    cy: float,
-    keep_cm: float,
-    ex: float,
-    ey: float,
-    x: float,
-    y: float,
-    ux: float,
-    uy: float,
-    r_cm: float,
-    half_cm: float,
-) -> bool:
-    """Tell whether both links are proved to keep off c while the tip is at most `half_cm` from (x, y) along (ux, uy).
-
-    All is seen from the base; (ex, ey) is the elbow for the tip at (x, y), r from the base.
-    """
-    l1, l2 = arm.l1_cm, arm.l2_cm
-    sin2 = least_sin2(arm, r_cm, half_cm)
-    if sin2 <= 0.0:
-        return False
-    least_cross, fx, fy = l1 * l2 * sqrt(sin2), x - ex, y - ey
-    cross = ex * fy - ey * fx
-    turns = (fx * ux + fy * uy) / cross, -(ex * ux + ey * uy) / cross
-    bounds1 = turning_bounds(l1, l2, least_cross, r_cm + half_cm)
-    if not link1_stays_clear(cx, cy, keep_cm, ex, ey, turns[0], bounds1, half_cm):
-        return False
-    bounds2 = turning_bounds(l2, l1, least_cross, r_cm + half_cm)
-    return link2_stays_clear(cx, cy, keep_cm, ex, ey, x, y, ux, uy, turns, bounds1, bounds2, half_cm)
-
-
-@bare_kernel
-def _near_obstacles(
-    arm: TwoLinkArm, centers_cm: Floats, radii_cm: Floats, x: float, y: float, rho_cm: float, near: NDArray[np.int64]
-) -> int:
-    """Fill `near` with the obstacles that the arm may touch while the tip is in a disc; return how many.
-
-    The others need not be looked at again for any disc within this one.
-    """
-    r2 = x * x + y * y
-    r = sqrt(r2)
-    ex, ey = elbow_from_base(arm, x, y, r2, r)
-    reach = displacement_bound(arm, r, rho_cm) + ROUNDING_CM + arm.margin_cm
-    count = 0
-    for i in range(radii_cm.size):
-        cx, cy, keep = centers_cm[i, 0] - arm.base_x_cm, centers_cm[i, 1] - arm.base_y_cm, radii_cm[i] + reach
-        if links_apart2(cx, cy, ex, ey, x, y, arm.per_l1, arm.per_l2) <= keep * keep:
-            near[count] = i
-            count += 1
-    return count
 
 
 @kernel
@@ -258,79 +191,6 @@ def next_piece(start: float, width: float) -> tuple[float, float]:
     while width < 1.0 and start % (2.0 * width) == 0.0:
         width *= 2.0
     return start, width
-
-
-@kernel
-def prove_line(world: ArmWorld, x0: float, y0: float, x1: float, y1: float) -> tuple[int, float]:
-    """Judge the straight move of the tip from (x0, y0) to (x1, y1), in cm.
-
-    The tip's least distance from the base on the move is taken exactly, the greatest is at an end.
-
-    Returns:
-        (verdict, parameter): PROVED; or BLOCKED with the share of the move, 0 to 1, at which the pose is not free; or
-        UNPROVED with the share around which the margin is too small for a proof, or joint 1 comes to the end of its
-        limits (at the ends of a full turn no single pose is forbidden, only the way across).
-    """
-    return prove_line_by(world, x0, y0, x1, y1, SMALLEST_CM)
-
-
-@kernel
-def prove_line_by(world: ArmWorld, x0: float, y0: float, x1: float, y1: float, smallest_cm: float) -> tuple[int, float]:
-    """`prove_line` with discs no smaller than this radius."""
-    arm, obstacles = world.arm, world.obstacles
-    centers, radii = obstacles.centers_cm, obstacles.radii_cm
-    first_vertex, vertices = obstacles.first_vertex, obstacles.vertices_cm
-    x0, y0, dx, dy = x0 - arm.base_x_cm, y0 - arm.base_y_cm, x1 - x0, y1 - y0
-    length = sqrt(dx * dx + dy * dy)
-    nearest = min(1.0, max(0.0, -(x0 * dx + y0 * dy) / (length * length))) if length > 0.0 else 0.0
-    for share in (0.0, 1.0, nearest):
-        x, y = x0 + share * dx, y0 + share * dy
-        if region_at(arm, sqrt(x * x + y * y)) != FREE:
-            return BLOCKED, share
-    near = np.empty(radii.size, np.int64) if radii.size > FEW else first_vertex
-    return _cover_line(arm, centers, radii, first_vertex, vertices, near, x0, y0, dx, dy, length, smallest_cm)
-
-
-@bare_kernel
-def _cover_line(
-    arm: TwoLinkArm,
-    centers_cm: Floats,
-    radii_cm: Floats,
-    first_vertex: NDArray[np.int64],
-    vertices_cm: Floats,
-    near: NDArray[np.int64],
-    x0: float,
-    y0: float,
-    dx: float,
-    dy: float,
-    length: float,
-    smallest_cm: float,
-) -> tuple[int, float]:
-    """Cover the line from (x0, y0), seen from the base, with discs, as `prove_line_by` does; `near` is memory."""
-    ux, uy = (dx / length, dy / length) if length > 0.0 else (0.0, 0.0)
-    start, width, count, ends_known = 0.0, 1.0, ALL, False
-    while start < 1.0:
-        if width < ENDS_BELOW and not ends_known:
-            # An end that only touches can be in no proved piece: not one, however many are tried on the way to it.
-            for share in (1.0, 0.0):
-                x, y = x0 + share * dx, y0 + share * dy
-                verdict = _verdict(arm, centers_cm, radii_cm, first_vertex, vertices_cm, near, count, x, y, 0.0, ux, uy)
-                if verdict != PROVED:
-                    return verdict, share
-            ends_known = True
-        middle = start + 0.5 * width
-        rho = 0.5 * width * length
-        x, y = x0 + middle * dx, y0 + middle * dy
-        verdict = _verdict(arm, centers_cm, radii_cm, first_vertex, vertices_cm, near, count, x, y, rho, ux, uy)
-        if count == ALL and verdict == UNPROVED and radii_cm.size > FEW:
-            count = _near_obstacles(arm, centers_cm, radii_cm, x, y, rho, near)
-        if verdict == PROVED:
-            start, width = next_piece(start, width)
-        elif verdict == BLOCKED or rho <= smallest_cm:
-            return verdict, middle
-        else:
-            width *= 0.5
-    return PROVED, 1.0
 
 
 @kernel
