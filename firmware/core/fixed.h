@@ -10,14 +10,10 @@ namespace planarm {
 using hal::add_to;
 using hal::Fixed48;
 using hal::multiply;
+using hal::multiply_q16;
+using hal::multiply_q32;
+using hal::multiply_saturated;
 using hal::subtract_from;
-
-// a b / 2^16 and a b / 2^32, rounded down; 2^32 - 1 when it does not fit.
-uint32_t multiply_q16(uint32_t a, uint32_t b);
-uint32_t multiply_q32(uint32_t a, uint32_t b);
-
-// a b, or 2^32 - 1 when that does not fit.
-uint32_t multiply_saturated(uint32_t a, uint32_t b);
 
 // 2^32 - 1 when the sum does not fit.
 inline uint32_t add_saturated(uint32_t a, uint32_t b) {

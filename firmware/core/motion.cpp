@@ -40,8 +40,7 @@ constexpr uint8_t MAX_SLICES = 4;
 uint32_t queued_path_ticks;  // of all segments not yet begun, saturated
 // What the segments after the last queued one go on from.
 struct QueueEnd {
-    Rest rests[wire::JOINTS];
-    int32_t usteps[wire::JOINTS];
+    JointEnd joints[wire::JOINTS];
     bool complete;  // the motion's last segment is queued
 };
 
@@ -149,22 +148,26 @@ bool Motion::is_starving(uint32_t path_ticks, uint32_t margin_ticks) const {
         need_ticks = static_cast<uint32_t>(payload.u8()) * wire::NEED_UNIT_TICKS;
         reading = true;
     }
-    Segment segment;
-    read_segment(payload, segment);
+    SegmentHead head;
+    read_head(payload, head);
+    for (Cursor& cursor : cursors) {
+        Move move;
+        read_move(payload, move);
+        cursor.begin(move);
+    }
     if (payload.at_end()) {
         queue::release();
         reading = false;
     }
-    segment_ticks = segment.duration_ticks;
+    segment_ticks = head.duration_ticks;
     slice_ticks = static_cast<uint16_t>(segment_ticks);
     if (segment_ticks > wire::SLICE_TICKS) {
         const uint32_t slices = (segment_ticks - 1) / wire::SLICE_TICKS + 1;
         slice_ticks = static_cast<uint16_t>((segment_ticks - 1) / slices + 1);
     }
-    segment_last = segment.last;
+    segment_last = head.last;
     if (queued_path_ticks != 0xFFFFFFFF) queued_path_ticks -= segment_ticks;
     if (queue::is_empty()) queued_path_ticks = 0;
-    for (uint8_t joint = 0; joint < wire::JOINTS; ++joint) cursors[joint].begin(segment.moves[joint]);
     slice.begin_segment();
     in_segment = true;
 }
@@ -248,14 +251,15 @@ void Motion::clear() {
     queue::clear();
     queued_path_ticks = 0;
     queue_end.complete = false;
-    for (Rest& rest : queue_end.rests) rest = Rest();
     running = reading = in_segment = segment_last = filling = frozen = starved = false;
     wish = Wish::GO;
     slice.begin_with(override_stretch);
     prepared_count = 0;
     for (Cursor& cursor : cursors) cursor.reset();
     const step_engine::Position position = step_engine::position();
-    for (uint8_t joint = 0; joint < wire::JOINTS; ++joint) queue_end.usteps[joint] = position.usteps[joint];
+    for (uint8_t joint = 0; joint < wire::JOINTS; ++joint) {
+        queue_end.joints[joint] = {JointEnd::FOREVER, position.usteps[joint], false};
+    }
 }
 
 void Motion::thaw() {
@@ -380,34 +384,38 @@ void halt() { current().halt(); }
 
 uint32_t tell_ledger(wire::Ledger& ledger) { return current().tell_ledger(ledger); }
 
-bool is_complete() { return queue_end.complete; }
-
 wire::Result begin_check(const uint8_t* bytes, uint8_t length) {
+    if (queue_end.complete) return wire::Result::WRONG_STATE;
     if (length > queue::free_bytes()) return wire::Result::BUSY;
-    checked.reader = Reader(bytes, length);
-    for (uint8_t i = 0; i < 3; ++i) checked.reader.u8();
-    checked.path_ticks = 0;
-    checked.end = queue_end;
-    checked.joint_out = wire::JOINTS;
-    return checked.reader.ok() && !checked.reader.at_end() ? wire::Result::OK : wire::Result::MALFORMED;
+    Check& at = hal::by_base(checked);
+    at.reader = Reader(bytes, length);
+    for (uint8_t i = 0; i < 3; ++i) at.reader.u8();
+    at.path_ticks = 0;
+    at.end = queue_end;
+    at.joint_out = wire::JOINTS;
+    return at.reader.ok() && !at.reader.at_end() ? wire::Result::OK : wire::Result::MALFORMED;
 }
 
 wire::Result check_next() {
-    if (checked.end.complete) return wire::Result::WRONG_STATE;
-    Segment segment;
-    read_segment(checked.reader, segment);
-    if (!checked.reader.ok()) return wire::Result::MALFORMED;
-    if (!check_segment(segment, checked.end.rests)) return wire::Result::OUT_OF_RANGE;
-    checked.path_ticks = add_saturated(checked.path_ticks, segment.duration_ticks);
-    checked.end.complete = segment.last;
-    for (uint8_t joint = 0; joint < wire::JOINTS; ++joint) {
-        const Move& move = segment.moves[joint];
-        int32_t& usteps = checked.end.usteps[joint];
-        usteps += move.positive ? static_cast<int32_t>(move.steps) : -static_cast<int32_t>(move.steps);
-        const Joint& limits = joints[joint];
-        if (move.steps == 0 || limits.least_usteps > limits.most_usteps) continue;
-        if (usteps < limits.least_usteps || usteps > limits.most_usteps) checked.joint_out = joint;
+    Check& at = hal::by_base(checked);
+    if (at.end.complete) return wire::Result::WRONG_STATE;
+    SegmentHead head;
+    read_head(at.reader, head);
+    bool good = head.duration_ticks != 0 && head.duration_ticks <= wire::MAX_SEGMENT_TICKS;
+    JointEnd* end = at.end.joints;
+    for (const Joint& joint : joints) {
+        Move move;
+        read_move(at.reader, move);
+        good = good && check_move(move, head.duration_ticks, *end);
+        const bool out = end->usteps < joint.least_usteps || end->usteps > joint.most_usteps;
+        const bool limited = joint.least_usteps <= joint.most_usteps;
+        if (limited && out && move.steps != 0) at.joint_out = static_cast<uint8_t>(end - at.end.joints);
+        ++end;
     }
+    if (!at.reader.ok()) return wire::Result::MALFORMED;
+    if (!good) return wire::Result::OUT_OF_RANGE;
+    at.path_ticks = add_saturated(at.path_ticks, head.duration_ticks);
+    at.end.complete = head.last;
     return wire::Result::OK;
 }
 
@@ -433,7 +441,7 @@ uint16_t free_bytes() { return queue::free_bytes(); }
 
 void set_position(uint8_t joint, int32_t usteps) {
     step_engine::set_position(joint, usteps);
-    queue_end.usteps[joint] = usteps;
+    queue_end.joints[joint].usteps = usteps;
 }
 
 }  // namespace motion

@@ -40,10 +40,7 @@ extern Joint joints[wire::JOINTS];
 // Empty queue, ledger 0, defaults. For start-up, before interrupts are on.
 void reset();
 
-// True when a segment marked as the motion's last is queued: nothing may follow it.
-bool is_complete();
-
-// Begins to check a SEGMENTS payload. OK, BUSY (no room), or MALFORMED.
+// Begins to check a SEGMENTS payload. OK, BUSY (no room), MALFORMED, or WRONG_STATE after the motion's last.
 wire::Result begin_check(const uint8_t* payload, uint8_t length);
 // Checks its next segment. OK, MALFORMED, OUT_OF_RANGE, or WRONG_STATE after the motion's last.
 wire::Result check_next();

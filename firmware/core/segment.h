@@ -1,4 +1,4 @@
-// A segment as the queue holds it, and the rules it must keep.
+// A segment as the queue holds it, and the rules that its moves must keep.
 #pragma once
 
 #include <stdint.h>
@@ -18,18 +18,17 @@ struct Move {
     bool positive;
 };
 
-struct Segment {
+struct SegmentHead {
     uint32_t duration_ticks;
     bool last;
-    Move moves[wire::JOINTS];
 };
 
-// Time from a joint's last queued step to the end of the queue, saturated; a joint that has not moved yet
-// counts as resting for ever.
-struct Rest {
+// Where a joint is at the end of the queue.
+struct JointEnd {
     static constexpr uint32_t FOREVER = 0xFFFFFFFF;
-    uint32_t ticks = FOREVER;
-    bool positive = false;  // the direction of that step
+    uint32_t rest_ticks;  // since its last step, saturated; FOREVER when it has not moved yet
+    int32_t usteps;
+    bool positive;  // the direction of that step
 };
 
 // Least time between two steps of a joint in opposite directions.
@@ -39,11 +38,12 @@ constexpr uint16_t MIN_REVERSAL_TICKS = wire::MIN_INTERVAL_TICKS + wire::MIN_DIR
 // step.
 bool run_ticks(const Move& move, uint32_t& ticks);
 
-// Reads the fields of the next segment.
-void read_segment(Reader& reader, Segment& segment);
+// Read the fields of the next segment: its head, then a move for each joint.
+void read_head(Reader& reader, SegmentHead& head);
+void read_move(Reader& reader, Move& move);
 
-// Checks a segment that follows after the joints' rests, and carries those on to its end. False when it
-// breaks a limit.
-bool check_segment(const Segment& segment, Rest (&rests)[wire::JOINTS]);
+// Checks a move that follows after `end` in a segment so long, and carries `end` on to the segment's. False
+// when it breaks a limit.
+bool check_move(const Move& move, uint32_t duration_ticks, JointEnd& end);
 
 }  // namespace planarm

@@ -21,9 +21,7 @@ uint32_t host_nonce;
 bool welcome_due;
 bool status_due;
 
-bool checking;  // a SEGMENTS frame is being carried out, segment by segment
-const uint8_t* payload;
-uint8_t payload_bytes;
+const Frame* checking;  // a SEGMENTS frame that is being carried out, segment by segment
 
 void note_refusal(Result result, uint8_t seq) {
     if (static_cast<int8_t>(result) >= 0 || report.refusal != Result::OK) return;
@@ -55,46 +53,40 @@ void hello(const Frame& frame) {
     welcome_due = true;
 }
 
-Result fail(Result result, Fault fault, uint8_t detail) {
-    supervisor::fail(fault, detail);
+// A motion with a segment left out must not go on.
+Result refuse(Result result) {
+    supervisor::fail(result == Result::WRONG_STATE ? Fault::QUEUE_MISUSE : Fault::BAD_SEGMENT);
     return result;
 }
 
 // Checks the next segment of the frame, or queues all after the last. True when the frame is done, with its
 // result.
 bool next_segment(Result& result) {
-    if (!supervisor::allows(Event::SEGMENTS)) {
-        result = Result::WRONG_STATE;
-        return true;
-    }
+    result = Result::WRONG_STATE;
+    if (!supervisor::allows(Event::SEGMENTS)) return true;
     result = motion::check_next();
-    if (result == Result::WRONG_STATE) {
-        result = fail(result, Fault::QUEUE_MISUSE, 0);
+    if (result != Result::OK) {
+        refuse(result);
         return true;
     }
-    if (result != Result::OK) {  // a motion with a segment left out must not go on
-        result = fail(result, Fault::BAD_SEGMENT, 0);
-        return true;
-    }
-    if (motion::joint_out_of_limits() != wire::JOINTS) {
-        result = fail(Result::OUT_OF_RANGE, Fault::SOFT_LIMIT, motion::joint_out_of_limits());
+    const uint8_t joint_out = motion::joint_out_of_limits();
+    if (joint_out != wire::JOINTS) {
+        supervisor::fail(Fault::SOFT_LIMIT, joint_out);
+        result = Result::OUT_OF_RANGE;
         return true;
     }
     if (!motion::is_checked()) return false;
-    if (!motion::commit(payload, payload_bytes)) result = Result::WRONG_STATE;
+    if (!motion::commit(checking->payload, checking->length)) result = Result::WRONG_STATE;
     return true;
 }
 
 // Begins with a SEGMENTS frame: what can be told of it as a whole.
 void begin_segments(const Frame& frame) {
     if (!supervisor::allows(Event::SEGMENTS)) return finish(Result::WRONG_STATE);
-    if (motion::is_complete()) return finish(fail(Result::WRONG_STATE, Fault::QUEUE_MISUSE, 0));
     const Result result = motion::begin_check(frame.payload, frame.length);
     if (result == Result::BUSY) return finish(result);
-    if (result != Result::OK) return finish(fail(result, Fault::BAD_SEGMENT, 0));
-    payload = frame.payload;
-    payload_bytes = frame.length;
-    checking = true;
+    if (result != Result::OK) return finish(refuse(result));
+    checking = &frame;
 }
 
 void execute(const Frame& frame) {
@@ -112,7 +104,8 @@ void execute(const Frame& frame) {
 void reset() {
     is_open = false;
     report = Report();
-    welcome_due = status_due = checking = false;
+    welcome_due = status_due = false;
+    checking = nullptr;
 }
 
 void on_frame(const Frame& frame) {
@@ -130,12 +123,12 @@ void on_damage() {
     status_due = true;
 }
 
-bool is_busy() { return checking; }
+bool is_busy() { return checking != nullptr; }
 
 void advance() {
     Result result;
     if (!next_segment(result)) return;
-    checking = false;
+    checking = nullptr;
     finish(result);
 }
 

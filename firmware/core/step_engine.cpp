@@ -31,8 +31,9 @@ struct Ring {
 
 Ring rings[wire::JOINTS];
 
-int32_t signed_steps(const Run& run, uint8_t steps) {
-    return run.positive ? static_cast<int32_t>(steps) : -static_cast<int32_t>(steps);
+// Moves a position on by steps of a run.
+[[gnu::noinline]] void add_steps(int32_t& position_usteps, const Run& run, uint8_t steps) {
+    position_usteps += run.positive ? static_cast<int16_t>(steps) : static_cast<int16_t>(-steps);
 }
 
 void clear(uint8_t joint) {
@@ -55,7 +56,7 @@ void take_back(uint8_t joint) {
     const Run* const active = active_run(joint);
     while (ring.oldest != active) {
         ring.oldest->chained = Chain::NONE;
-        ring.position_usteps += signed_steps(*ring.oldest, ring.oldest->steps);
+        add_steps(ring.position_usteps, *ring.oldest, ring.oldest->steps);
         ring.oldest = ring.oldest->next;
     }
 }
@@ -81,14 +82,22 @@ bool start(const Run& run) {
     return true;
 }
 
+enum class Due : uint8_t { NO, YES, TOO_LATE };
+
+// Whether an idle joint's next run must be started now. Its interrupt is off: nobody else writes `active`.
+Due is_due(uint8_t joint) {
+    const Run* const run = step_joints[joint].active;
+    if (run == rings[joint].free) return Due::NO;
+    const int32_t away_ticks = clock::ticks_until(run->first_ticks);
+    if (away_ticks > START_AHEAD_TICKS) return Due::NO;
+    return away_ticks > 0 ? Due::YES : Due::TOO_LATE;
+}
+
 template <uint8_t JOINT>
 bool start_when_due() {
     if (hal::step_interrupt_is_on<JOINT>()) return true;
-    const Run* const run = step_joints[JOINT].active;  // the interrupt is off: nobody else writes it
-    if (run == rings[JOINT].free) return true;
-    const int32_t away_ticks = clock::ticks_until(run->first_ticks);
-    if (away_ticks > START_AHEAD_TICKS) return true;
-    return away_ticks > 0 && start<JOINT>(*run);
+    const Due due = is_due(JOINT);
+    return due == Due::NO || (due == Due::YES && start<JOINT>(*step_joints[JOINT].active));
 }
 
 // A pulse that rose without its interrupt having come: counts it and lets it fall. Interrupts are off,
@@ -100,22 +109,22 @@ void finish_pulse() {
     hal::step_fall<JOINT>();
 }
 
-template <uint8_t JOINT>
-uint8_t executed_steps(const Run& run) {
-    return static_cast<uint8_t>(run.steps - hal::steps_left<JOINT>());
+// Cuts the executed part off a joint's active run: that goes to the position, the rest starts at
+// `first_ticks`.
+void cut(uint8_t joint, uint8_t left, uint16_t fraction, uint32_t first_ticks) {
+    Run& run = *step_joints[joint].active;
+    add_steps(rings[joint].position_usteps, run, static_cast<uint8_t>(run.steps - left));
+    run.steps = left;
+    run.fraction = fraction;
+    run.first_ticks = first_ticks;
+    if (left == 0) step_joints[joint].active = run.next;
 }
 
-// What a joint that had its interrupt on has executed of its active run goes to the position, and the rest of
-// the run starts at `first_ticks`. The interrupt is off by now.
+// The same for a joint that had its interrupt on, which is off by now.
 template <uint8_t JOINT>
 void cut_active(uint8_t were_on, uint32_t first_ticks) {
     if ((were_on & hal::step_interrupt_mask<JOINT>()) == 0) return;
-    Run& run = *step_joints[JOINT].active;
-    rings[JOINT].position_usteps += signed_steps(run, executed_steps<JOINT>(run));
-    run.steps = hal::steps_left<JOINT>();
-    run.fraction = hal::step_fraction<JOINT>();
-    run.first_ticks = first_ticks;
-    if (run.steps == 0) step_joints[JOINT].active = run.next;
+    cut(JOINT, hal::steps_left<JOINT>(), hal::step_fraction<JOINT>(), first_ticks);
 }
 
 template <uint8_t JOINT>
@@ -267,11 +276,12 @@ Position position() {
     });
     for (uint8_t joint = 0; joint < wire::JOINTS; ++joint) {
         const Ring& ring = rings[joint];
-        int32_t usteps = ring.position_usteps;
+        int32_t& usteps = total.usteps[joint];
+        usteps = ring.position_usteps;
         for (const Run* run = ring.oldest; run != now.active[joint]; run = run->next) {
-            usteps += signed_steps(*run, run->steps);
+            add_steps(usteps, *run, run->steps);
         }
-        total.usteps[joint] = usteps + signed_steps(*now.active[joint], risen[joint]);
+        add_steps(usteps, *now.active[joint], risen[joint]);
     }
     return total;
 }

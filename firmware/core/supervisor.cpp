@@ -13,93 +13,92 @@ using wire::State;
 
 namespace {
 
-struct Row {
-    Event event;
-    State from;
-    State to;
-    Outcome outcome;
-};
+// A row of the table in two bytes: event, state, next state and outcome.
+constexpr uint16_t row(Event event, State from, State to, Outcome outcome) {
+    return static_cast<uint16_t>(static_cast<unsigned>(event) << 11 | static_cast<unsigned>(from) << 7 |
+                                 static_cast<unsigned>(to) << 3 | static_cast<unsigned>(outcome));
+}
+static_assert(static_cast<uint8_t>(Event::DONE) < 32 && static_cast<uint8_t>(State::HOMING) < 16 &&
+                  static_cast<uint8_t>(Outcome::REST_QUICKLY) < 8 &&
+                  row(Event::ENABLE, State::IDLE, State::READY, Outcome::ENERGISE) != 0,
+              "the widths in a row; 0 is none");
 
 // tests/firmware/test_firmware_supervisor.py holds the same table and tries every event in every state.
-const Row ROWS[] HAL_FLASH = {
-    {Event::ENABLE, State::IDLE, State::READY, Outcome::ENERGISE},
-    {Event::ENABLE, State::READY, State::READY, Outcome::NONE},
+const uint16_t ROWS[] HAL_FLASH = {
+    row(Event::ENABLE, State::IDLE, State::READY, Outcome::ENERGISE),
+    row(Event::ENABLE, State::READY, State::READY, Outcome::NONE),
 
-    {Event::RELEASE, State::IDLE, State::IDLE, Outcome::NONE},
-    {Event::RELEASE, State::READY, State::IDLE, Outcome::RELEASE},
-    {Event::RELEASE, State::HELD, State::IDLE, Outcome::RELEASE},
-    {Event::RELEASE, State::STARVED, State::IDLE, Outcome::RELEASE},
+    row(Event::RELEASE, State::IDLE, State::IDLE, Outcome::NONE),
+    row(Event::RELEASE, State::READY, State::IDLE, Outcome::RELEASE),
+    row(Event::RELEASE, State::HELD, State::IDLE, Outcome::RELEASE),
+    row(Event::RELEASE, State::STARVED, State::IDLE, Outcome::RELEASE),
 
-    {Event::SEGMENTS, State::READY, State::READY, Outcome::NONE},
-    {Event::SEGMENTS, State::RUNNING, State::RUNNING, Outcome::NONE},
-    {Event::SEGMENTS, State::HOLDING, State::HOLDING, Outcome::NONE},
-    {Event::SEGMENTS, State::HELD, State::HELD, Outcome::NONE},
-    {Event::SEGMENTS, State::STARVED, State::STARVED, Outcome::NONE},
+    row(Event::SEGMENTS, State::READY, State::READY, Outcome::NONE),
+    row(Event::SEGMENTS, State::RUNNING, State::RUNNING, Outcome::NONE),
+    row(Event::SEGMENTS, State::HOLDING, State::HOLDING, Outcome::NONE),
+    row(Event::SEGMENTS, State::HELD, State::HELD, Outcome::NONE),
+    row(Event::SEGMENTS, State::STARVED, State::STARVED, Outcome::NONE),
 
-    {Event::START, State::READY, State::RUNNING, Outcome::GO},
+    row(Event::START, State::READY, State::RUNNING, Outcome::GO),
 
-    {Event::CLEAR, State::IDLE, State::IDLE, Outcome::RELEASE},
-    {Event::CLEAR, State::READY, State::IDLE, Outcome::RELEASE},
-    {Event::CLEAR, State::HELD, State::IDLE, Outcome::RELEASE},
-    {Event::CLEAR, State::STARVED, State::IDLE, Outcome::RELEASE},
-    {Event::CLEAR, State::FAULT, State::IDLE, Outcome::RELEASE},
+    row(Event::CLEAR, State::IDLE, State::IDLE, Outcome::RELEASE),
+    row(Event::CLEAR, State::READY, State::IDLE, Outcome::RELEASE),
+    row(Event::CLEAR, State::HELD, State::IDLE, Outcome::RELEASE),
+    row(Event::CLEAR, State::STARVED, State::IDLE, Outcome::RELEASE),
+    row(Event::CLEAR, State::FAULT, State::IDLE, Outcome::RELEASE),
 
-    {Event::HOLD, State::RUNNING, State::HOLDING, Outcome::REST},
-    {Event::HOLD, State::STARVED, State::HOLDING, Outcome::REST},
-    {Event::HOLD, State::HOMING, State::READY, Outcome::DROP},
+    row(Event::HOLD, State::RUNNING, State::HOLDING, Outcome::REST),
+    row(Event::HOLD, State::STARVED, State::HOLDING, Outcome::REST),
+    row(Event::HOLD, State::HOMING, State::READY, Outcome::DROP),
 
-    {Event::RESUME, State::HOLDING, State::RUNNING, Outcome::GO},
-    {Event::RESUME, State::HELD, State::RUNNING, Outcome::GO},
+    row(Event::RESUME, State::HOLDING, State::RUNNING, Outcome::GO),
+    row(Event::RESUME, State::HELD, State::RUNNING, Outcome::GO),
 
-    {Event::STOP, State::READY, State::READY, Outcome::DROP},
-    {Event::STOP, State::RUNNING, State::STOPPING, Outcome::REST},
-    {Event::STOP, State::HOLDING, State::STOPPING, Outcome::REST},
-    {Event::STOP, State::STOPPING, State::STOPPING, Outcome::NONE},
-    {Event::STOP, State::HELD, State::READY, Outcome::DROP},
-    {Event::STOP, State::STARVED, State::READY, Outcome::DROP},
-    {Event::STOP, State::HOMING, State::READY, Outcome::DROP},
+    row(Event::STOP, State::READY, State::READY, Outcome::DROP),
+    row(Event::STOP, State::RUNNING, State::STOPPING, Outcome::REST),
+    row(Event::STOP, State::HOLDING, State::STOPPING, Outcome::REST),
+    row(Event::STOP, State::STOPPING, State::STOPPING, Outcome::NONE),
+    row(Event::STOP, State::HELD, State::READY, Outcome::DROP),
+    row(Event::STOP, State::STARVED, State::READY, Outcome::DROP),
+    row(Event::STOP, State::HOMING, State::READY, Outcome::DROP),
 
-    {Event::QUICK_STOP, State::READY, State::READY, Outcome::DROP},
-    {Event::QUICK_STOP, State::RUNNING, State::STOPPING, Outcome::REST_QUICKLY},
-    {Event::QUICK_STOP, State::HOLDING, State::STOPPING, Outcome::REST_QUICKLY},
-    {Event::QUICK_STOP, State::STOPPING, State::STOPPING, Outcome::REST_QUICKLY},
-    {Event::QUICK_STOP, State::HELD, State::READY, Outcome::DROP},
-    {Event::QUICK_STOP, State::STARVED, State::READY, Outcome::DROP},
-    {Event::QUICK_STOP, State::HOMING, State::READY, Outcome::DROP},
+    row(Event::QUICK_STOP, State::READY, State::READY, Outcome::DROP),
+    row(Event::QUICK_STOP, State::RUNNING, State::STOPPING, Outcome::REST_QUICKLY),
+    row(Event::QUICK_STOP, State::HOLDING, State::STOPPING, Outcome::REST_QUICKLY),
+    row(Event::QUICK_STOP, State::STOPPING, State::STOPPING, Outcome::REST_QUICKLY),
+    row(Event::QUICK_STOP, State::HELD, State::READY, Outcome::DROP),
+    row(Event::QUICK_STOP, State::STARVED, State::READY, Outcome::DROP),
+    row(Event::QUICK_STOP, State::HOMING, State::READY, Outcome::DROP),
 
-    {Event::CONFIG, State::IDLE, State::IDLE, Outcome::NONE},
-    {Event::SOFT_LIMITS, State::IDLE, State::IDLE, Outcome::NONE},
-    {Event::SOFT_LIMITS, State::READY, State::READY, Outcome::NONE},
-    {Event::SET_POSITION, State::IDLE, State::IDLE, Outcome::NONE},
-    {Event::SET_POSITION, State::READY, State::READY, Outcome::NONE},
-    {Event::HOME, State::READY, State::HOMING, Outcome::DROP},
+    row(Event::CONFIG, State::IDLE, State::IDLE, Outcome::NONE),
+    row(Event::SOFT_LIMITS, State::IDLE, State::IDLE, Outcome::NONE),
+    row(Event::SOFT_LIMITS, State::READY, State::READY, Outcome::NONE),
+    row(Event::SET_POSITION, State::IDLE, State::IDLE, Outcome::NONE),
+    row(Event::SET_POSITION, State::READY, State::READY, Outcome::NONE),
+    row(Event::HOME, State::READY, State::HOMING, Outcome::DROP),
 
-    {Event::AT_REST, State::HOLDING, State::HELD, Outcome::NONE},
-    {Event::AT_REST, State::STOPPING, State::READY, Outcome::DROP},
-    {Event::STARVED, State::RUNNING, State::STARVED, Outcome::NONE},
-    {Event::FED, State::STARVED, State::RUNNING, Outcome::NONE},
-    {Event::DONE, State::RUNNING, State::READY, Outcome::NONE},
-    {Event::DONE, State::HOLDING, State::READY, Outcome::NONE},
-    {Event::DONE, State::STOPPING, State::READY, Outcome::NONE},
-    {Event::DONE, State::HOMING, State::READY, Outcome::DROP},
+    row(Event::AT_REST, State::HOLDING, State::HELD, Outcome::NONE),
+    row(Event::AT_REST, State::STOPPING, State::READY, Outcome::DROP),
+    row(Event::STARVED, State::RUNNING, State::STARVED, Outcome::NONE),
+    row(Event::FED, State::STARVED, State::RUNNING, Outcome::NONE),
+    row(Event::DONE, State::RUNNING, State::READY, Outcome::NONE),
+    row(Event::DONE, State::HOLDING, State::READY, Outcome::NONE),
+    row(Event::DONE, State::STOPPING, State::READY, Outcome::NONE),
+    row(Event::DONE, State::HOMING, State::READY, Outcome::DROP),
 };
 
 State current_state;
 Fault latched_fault;
 uint8_t latched_detail;
 
-static_assert(sizeof(Row) == 4, "rows are read byte by byte");
-
-bool find(Event event, Row& row) {
-    for (const Row& candidate : ROWS) {
-        const uint8_t* const bytes = reinterpret_cast<const uint8_t*>(&candidate);
-        if (hal::flash_byte(bytes) != static_cast<uint8_t>(event)) continue;
-        if (hal::flash_byte(bytes + 1) != static_cast<uint8_t>(current_state)) continue;
-        row = {event, current_state, static_cast<State>(hal::flash_byte(bytes + 2)),
-               static_cast<Outcome>(hal::flash_byte(bytes + 3))};
-        return true;
+// The event's row in this state; 0 when there is none: the first row is not 0.
+uint16_t find(Event event) {
+    const uint16_t wanted = row(event, current_state, State::IDLE, Outcome::NONE) >> 7;
+    for (const uint16_t& entry : ROWS) {
+        const uint16_t found = hal::flash_word(&entry);
+        if (found >> 7 == wanted) return found;
     }
-    return false;
+    return 0;
 }
 
 void carry_out(Outcome outcome) {
@@ -139,17 +138,14 @@ Fault fault() { return latched_fault; }
 
 uint8_t fault_detail() { return latched_detail; }
 
-bool allows(Event event) {
-    Row row;
-    return find(event, row);
-}
+bool allows(Event event) { return find(event) != 0; }
 
 void apply(Event event) {
-    Row row;
-    if (!find(event, row)) return;
-    current_state = row.to;
+    const uint16_t found = find(event);
+    if (found == 0) return;
+    current_state = static_cast<State>((found >> 3) & 0x0F);
     power::note_activity();
-    carry_out(row.outcome);
+    carry_out(static_cast<Outcome>(found & 0x07));
 }
 
 void fail(Fault fault, uint8_t detail) {

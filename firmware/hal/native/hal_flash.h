@@ -7,6 +7,6 @@
 
 namespace hal {
 
-inline uint8_t flash_byte(const void* address) { return *static_cast<const uint8_t*>(address); }
+inline uint16_t flash_word(const uint16_t* address) { return *address; }
 
 }  // namespace hal

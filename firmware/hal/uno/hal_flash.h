@@ -8,7 +8,7 @@
 
 namespace hal {
 
-// The byte at an address in a HAL_FLASH table.
-inline uint8_t flash_byte(const void* address) { return pgm_read_byte(address); }
+// The word at an address in a HAL_FLASH table.
+inline uint16_t flash_word(const uint16_t* address) { return pgm_read_word(address); }
 
 }  // namespace hal

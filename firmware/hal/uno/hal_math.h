@@ -11,6 +11,11 @@ namespace hal {
 // a b, in 48 bits; 62 cycles with call and return.
 Fixed48 multiply(uint32_t a, uint16_t b);
 
+// a b; a b / 2^16 and a b / 2^32, rounded down: 2^32 - 1 when it does not fit. 75 cycles, and about 220.
+uint32_t multiply_saturated(uint32_t a, uint16_t b);
+uint32_t multiply_q16(uint32_t a, uint32_t b);
+uint32_t multiply_q32(uint32_t a, uint32_t b);
+
 // sum += term and sum -= term; 38 cycles with call and return.
 void add_to(Fixed48& sum, Fixed48 term);
 void subtract_from(Fixed48& sum, Fixed48 term);
