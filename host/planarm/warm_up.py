@@ -151,6 +151,11 @@ def warm_up_replanning() -> None:
     border, margin_cm = first_border(plan, 0, 0.0), planning_margin_cm(scene)
     assert border is not None, "a motion has more than one segment"
     plan_from_border(scene, task, plan, border, 0.0, margin_cm)
+    here, then = task.planner.solve().nodes[:2]
+    graph = task.roadmap.graph
+    (first,) = np.flatnonzero((graph.tail == here) & (graph.head == then))
+    task.planner.change(changes._replace(edges=np.array([first]), costs=np.array([np.inf])))
+    task.planner.solve()
 
 
 def warm_up_moving() -> None:

@@ -279,23 +279,82 @@ def test_costs_are_asked_for_only_where_the_search_comes():
         assert planner.solve().cost == pytest.approx(dijkstra(whole, goal).get(start, math.inf))
 
 
-def test_a_repair_far_from_the_goal_is_cheap_and_one_at_the_goal_is_not_attempted():
-    """The tool takes the cheaper one: next to the goal nearly every stored way leads through the closed edges."""
+def test_the_first_answer_is_searched_from_the_start_and_distances_are_settled_when_asked_again():
     size = 40
-    for near, anew in (("start", False), ("goal", True)):
-        walk = Walk(1, size, share=0.0)
-        planner = GraphPlanner(walk.graph, Bounds.none(size * size), (0, size * size - 1), "mpd_star_lite")
-        first = planner.solve()
-        node, goal = first.nodes[1], size * size - 1
-        at_start = (walk.graph.head == node) | (walk.graph.tail == node)
-        at_goal = (walk.graph.head == goal) & (walk.graph.tail != goal - 1)  # one of three ways in stays open
-        edges = np.flatnonzero(at_start if near == "start" else at_goal)
-        planner.change(Changes(edges, np.full(len(edges), np.inf)))
-        again = planner.solve()
-        assert again.anew is anew
-        assert again.cost == pytest.approx(dijkstra(walk.graph, size * size - 1)[0])
-        if not anew:
-            assert again.work.expanded < 0.2 * first.work.expanded
+    walk = Walk(1, size, share=0.0)
+    planner = GraphPlanner(walk.graph, Bounds.none(size * size), (0, size * size - 1), "mpd_star_lite")
+    first = planner.solve()
+    node = first.nodes[1]
+    edges = np.flatnonzero((walk.graph.head == node) | (walk.graph.tail == node))
+    planner.change(Changes(edges, np.full(len(edges), np.inf)))
+    ahead, again, third = planner.solve(), planner.solve(), planner.solve()
+    wanted = dijkstra(walk.graph, size * size - 1)[0]
+    for answer in (ahead, again, third):
+        assert answer.cost == pytest.approx(wanted)
+        assert path_cost(walk.graph, answer.nodes.tolist()) == pytest.approx(wanted)
+        assert not answer.anew
+    assert ahead.work.expanded < 0.01 * first.work.expanded
+    assert again.work.expanded < 0.2 * first.work.expanded
+    assert third.work.expanded == 0
+
+
+def test_next_to_the_goal_nearly_every_stored_way_is_cut_and_the_search_begins_anew():
+    count = 400
+    nodes = np.arange(count)
+    tail = np.concatenate([nodes[1:], nodes[1:]])
+    head = np.concatenate([nodes[:-1], np.append(nodes[2:], 0)])
+    cost = np.ones(len(tail))
+    cost[-1] = 10.0 * count  # the long way round
+    graph = digraph(count, tail, head, cost)
+    planner = GraphPlanner(graph, Bounds.none(count), (count // 2, 0), "mpd_star_lite")
+    assert planner.solve().cost == count // 2
+    planner.change(Changes(np.array([0]), np.array([np.inf])))
+    answer = planner.solve()
+    assert answer.anew
+    assert answer.cost == pytest.approx(10.0 * count + count // 2 - 1)
+
+
+def test_where_old_distances_mislead_the_search_from_the_start_gives_up():
+    """The goal's only door but a far one is closed, so everything looks near by its old distance."""
+    size = 40
+    walk = Walk(1, size, share=0.0)
+    wall = walk.tail % size < 20  # from there into the other half there are two doors
+    door = (walk.tail // size == 0) & (walk.head // size == 0)
+    across = wall & (walk.head % size >= 20)
+    far = (walk.tail // size == size - 1) & (walk.head // size == size - 1)
+    walk.graph.cost[across & ~door & ~far] = np.inf
+    planner = GraphPlanner(walk.graph, Bounds.none(size * size), (0, size - 1), "mpd_star_lite")
+    assert planner.solve().cost == size - 1
+    closed = np.flatnonzero(across & door)
+    planner.change(Changes(closed, np.full(len(closed), np.inf)))
+    answer = planner.solve()
+    assert answer.cost == pytest.approx(dijkstra(walk.graph, size - 1)[0])
+    assert answer.work.expanded > 0.04 * size * size  # more than a search from the start may
+
+
+def test_several_rises_before_anybody_asks_and_a_fall_after_them(sized):
+    """Whatever was told in between, answers are right: rises wait to be settled, a fall settles them."""
+    for seed in range(sized(60, 1000)):
+        rng = random.Random(seed)
+        made = RandomGraph(rng)
+        graph, start = made.graph(), rng.randrange(made.count)
+        planner = GraphPlanner(graph, made.bounds(), (start, made.goal), "mpd_star_lite")
+        planner.solve()
+        for _ in range(12):
+            edges = np.array(rng.sample(range(len(made.tail)), rng.randrange(1, 4)))
+            if rng.random() < 0.8:
+                planner.change(Changes(edges, graph.cost[edges] * rng.choice([1.5, 3.0, math.inf])))
+            elif rng.random() < 0.3:
+                planner.change(Changes(edges, made.floor[edges].astype(np.float64)))
+            if rng.random() < 0.4:
+                start = rng.randrange(made.count)
+                planner.move_start(start)
+            for _ in range(rng.choice([0, 1, 1, 2])):
+                answer = planner.solve()
+                wanted = dijkstra(graph, made.goal).get(start, math.inf)
+                assert answer.cost == pytest.approx(wanted, rel=1e-9), seed
+                if wanted < math.inf:
+                    assert path_cost(graph, answer.nodes.tolist()) == pytest.approx(wanted, rel=1e-9), seed
 
 
 def test_bounds_never_exceed_distances_and_fall_short_of_them_by_no_edge_s_worth():

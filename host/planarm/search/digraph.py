@@ -25,9 +25,9 @@ BELOW_ONE = 1.0 - 1e-9
 class Digraph(NamedTuple):
     """m directed edges between n nodes, by tail and by head."""
 
-    tail: Ints
+    tail: Links
     """Shape (m,)."""
-    head: Ints
+    head: Links
     out_first: Ints
     """Edges out of node u are `out_edge[out_first[u] : out_first[u + 1]]`; shape (n + 1,)."""
     out_edge: Links
@@ -96,9 +96,8 @@ def digraph(nodes: int, tail: ArrayLike, head: ArrayLike, cost: ArrayLike) -> Di
     out_first, out_edge = _by(tails, nodes)
     in_first, in_edge = _by(heads, nodes)
     narrow_heads, narrow_tails = heads.astype(np.int32), tails.astype(np.int32)
-    return Digraph(
-        tails, heads, out_first, out_edge, narrow_heads[out_edge], in_first, in_edge, narrow_tails[in_edge], costs
-    )
+    out_head, in_tail = narrow_heads[out_edge], narrow_tails[in_edge]
+    return Digraph(narrow_tails, narrow_heads, out_first, out_edge, out_head, in_first, in_edge, in_tail, costs)
 
 
 def _by(ends: Ints, nodes: int) -> tuple[Ints, Links]:

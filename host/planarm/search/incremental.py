@@ -10,6 +10,7 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
+from planarm.search.ahead import BEGIN, GAVE_UP, new_ahead, path_ahead, search_ahead
 from planarm.search.digraph import Bounds, Digraph, Floats, Ints
 from planarm.search.lifelong import (
     COUNTERS,
@@ -27,19 +28,25 @@ from planarm.search.lifelong import (
 )
 from planarm.search.read_off import gradient_path, stored_path
 from planarm.search.result import SearchStatus
-from planarm.search.stored_tree import TOO_MANY, change_stored
+from planarm.search.stored_tree import TOO_MANY, change_costs, cut_off
 
 GraphAlgorithm = Literal["mpd_star_lite", "d_star_lite", "roadmap_a_star"]
 
 Costing = Callable[[int], None]
 """Told a node; fills in the costs of all edges into it that are not known."""
 
-REPAIR_SHARE = 0.5
+REPAIR_SHARE = 0.7
 """A change is repaired when it cuts off fewer nodes than this share of what a search anew expanded last.
 
-A node that is cut off is found, compares its successors and is expanded again, for about the price of two expansions of
-A*; and a way that has become longer takes nodes that no way led through before."""
+A node that is cut off is found, compares its successors and is expanded again, for about the price of one and a half
+expansions of A*; and a way that has become longer takes nodes that no way led through before."""
 
+AHEAD_SHARE = 0.04
+LEAST_AHEAD = 50
+"""Share of all nodes, and their number, that a search from the start may expand before it gives up."""
+
+
+NO_EDGES = np.empty(0, np.int64)
 
 NOWHERE = -1
 """A start that is never reached, so that all distances are found."""
@@ -107,6 +114,10 @@ class GraphPlanner:
         self._last_anew = 0
         self._fresh = True
         self._branch = np.empty(graph.nodes, np.int64)
+        self._roots = 0
+        self._answered = self._fell = False
+        self._ahead = new_ahead(graph.nodes)
+        self._limit = 0.0, 0
         self._start_over(*ends)
 
     @property
@@ -118,14 +129,17 @@ class GraphPlanner:
         """Return the best path from the start as it is now."""
         if self._algorithm == "roadmap_a_star":
             self._start_over(self.start, int(self._state.ends[GOAL]))
+        if self._roots and not self._answered:
+            self._answered = True
+            if (answer := self._solve_ahead()) is not None:
+                return answer
+        self._settle()
         anew, before = self._fresh, self._state.counted.copy()
         # A first plan has nothing to repair; D* Lite is left as it is published.
         search = best_first if self._fresh and self._state.stores else repair
         while (needing := search(self._graph, self._bounds, self._state)) != DONE:
-            if self._costing is None:
-                raise ValueError(f"the cost of an edge into node {needing} is not known, and nothing tells it")
-            self._costing(needing)
-        self._fresh = False
+            self._ask_for(needing)
+        self._fresh, self._limit = False, (float(self._state.rhs[self.start]), self.start)
         counted = self._state.counted - before
         if anew:
             self._last_anew = int(counted[EXPANDED])
@@ -136,14 +150,60 @@ class GraphPlanner:
         edges, costs = changes
         if not self._state.stores:
             change(self._graph, self._bounds, self._state, edges, costs)
-            return
-        if self._fresh or self._algorithm == "roadmap_a_star":
+        elif self._fresh or self._algorithm == "roadmap_a_star":
             self._graph.cost[edges] = costs
+            self._start_over(self.start, int(self._state.ends[GOAL]))
         else:
-            most = self._graph.nodes if self._always_repair else int(REPAIR_SHARE * self._last_anew)
-            if change_stored(self._graph, self._bounds, self._state, changes[:], most, self._branch) != TOO_MANY:
-                return
-        self._start_over(self.start, int(self._state.ends[GOAL]))
+            self._roots, falls = change_costs(self._graph, self._state, edges, costs, self._branch, self._roots)
+            self._answered = False
+            self._fell = self._fell or falls
+            if self._fell or self._always_repair:  # old distances are no bounds any more, or nobody wants them
+                self._settle(edges if falls else edges[:0])
+
+    def _settle(self, fallen: Ints = NO_EDGES) -> None:
+        """Make the state ready for a repair, after all changes that were told; or begin anew where that is cheaper."""
+        if not self._roots and not len(fallen):
+            return
+        most = self._graph.nodes if self._always_repair else int(REPAIR_SHARE * self._last_anew)
+        count = cut_off(self._graph, self._bounds, self._state, fallen, most, self._branch, self._roots)
+        self._roots = 0
+        if count == TOO_MANY:
+            self._start_over(self.start, int(self._state.ends[GOAL]))
+
+    def _solve_ahead(self) -> GraphAnswer | None:
+        """Return the best path after costs have risen, by a search from the start; None where that is too much work.
+
+        Distances are settled later.
+        """
+        state, start = self._state, self.start
+        if start == self._limit[1] or state.g[start] < np.inf:  # its stored way was the best
+            nodes, read_off = stored_path(state)
+            if nodes[-1] == state.ends[GOAL]:
+                cost = float(min(state.g[start], state.rhs[start]))
+                return GraphAnswer(SearchStatus.FOUND, nodes, cost, Work(0, 0, 0, 0, read_off), anew=False)
+        ahead, most = self._ahead, max(LEAST_AHEAD, int(AHEAD_SHARE * self._graph.nodes))
+        ahead.limit[0], ahead.limit_start[0] = self._limit
+        needing = BEGIN
+        while (found := search_ahead(self._graph, self._bounds, state, ahead, most, needing))[0] >= 0:
+            needing = found[0]
+            self._ask_for(needing)
+        if found[0] == GAVE_UP:
+            return None
+        whole = found[1]
+        if whole < 0:
+            nodes, cost = np.empty(0, np.int64), np.inf
+        else:
+            room = np.empty(self._graph.nodes, np.int64)
+            nodes = room[: path_ahead(state, ahead, whole, room)].copy()
+            cost = float(ahead.distance[whole] + state.g[whole])
+        _, expanded, updated, looked = (int(count) for count in ahead.counted)
+        status = SearchStatus.FOUND if len(nodes) else SearchStatus.NO_PATH
+        return GraphAnswer(status, nodes, cost, Work(expanded, updated, looked, 0, len(nodes)), anew=False)
+
+    def _ask_for(self, node: int) -> None:
+        if self._costing is None:
+            raise ValueError(f"the cost of an edge into node {node} is not known, and nothing tells it")
+        self._costing(node)
 
     def move_start(self, node: int) -> None:
         """Tell that paths begin at another node from now on."""
@@ -152,7 +212,7 @@ class GraphPlanner:
     def _start_over(self, start: int, goal: int) -> None:
         stores = self._algorithm != "d_star_lite"
         self._state = new_lifelong(self._graph.nodes, start, goal, stores=stores)
-        self._fresh = True
+        self._fresh, self._fell, self._roots = True, False, 0
 
     def _answer(self, counted: Ints, anew: bool) -> GraphAnswer:
         assert len(counted) == COUNTERS

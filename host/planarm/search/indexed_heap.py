@@ -22,7 +22,7 @@ class Heap(NamedTuple):
     place: Ints
     """Where each node stands in the heap, -1 for nowhere; shape (n,)."""
     keys: Floats
-    """Each node's key, valid while it is in the heap; shape (n, 2)."""
+    """The keys in heap order, beside the nodes; shape (n, 2)."""
     size: Ints
     """Shape (1,)."""
 
@@ -39,8 +39,7 @@ def put(heap: Heap, node: int, first: float, second: float) -> None:
     if at < 0:
         at = heap.size[0]
         heap.size[0] += 1
-    heap.keys[node, 0], heap.keys[node, 1] = first, second
-    _settle(heap, node, at)
+    _settle(heap, node, first, second, at)
 
 
 @kernel
@@ -51,35 +50,34 @@ def take_out(heap: Heap, node: int) -> None:
         return
     heap.place[node] = -1
     heap.size[0] -= 1
-    if at < heap.size[0]:
-        _settle(heap, heap.nodes[heap.size[0]], at)
+    last = heap.size[0]
+    if at < last:
+        _settle(heap, heap.nodes[last], heap.keys[last, 0], heap.keys[last, 1], at)
 
 
 @kernel
-def _settle(heap: Heap, node: int, at: int) -> None:
+def _settle(heap: Heap, node: int, first: float, second: float, at: int) -> None:
     """Put a node at a place whose own node has left it, and move it up or down to where it belongs."""
     nodes, place, keys, size = heap.nodes, heap.place, heap.keys, heap.size[0]
-    first, second = keys[node, 0], keys[node, 1]
     while at > 0:
         parent = (at - 1) // 2
-        above = nodes[parent]
-        if keys[above, 0] < first or (keys[above, 0] == first and keys[above, 1] <= second):
+        if keys[parent, 0] < first or (keys[parent, 0] == first and keys[parent, 1] <= second):
             break
-        nodes[at], place[above] = above, at
+        above = nodes[parent]
+        nodes[at], keys[at, 0], keys[at, 1], place[above] = above, keys[parent, 0], keys[parent, 1], at
         at = parent
     while True:
         child = 2 * at + 1
         if child >= size:
             break
-        below = nodes[child]
-        if child + 1 < size:
-            other = nodes[child + 1]
-            if keys[other, 0] < keys[below, 0] or (
-                keys[other, 0] == keys[below, 0] and keys[other, 1] < keys[below, 1]
-            ):
-                child, below = child + 1, other
-        if keys[below, 0] > first or (keys[below, 0] == first and keys[below, 1] >= second):
+        other = child + 1
+        if other < size and (
+            keys[other, 0] < keys[child, 0] or (keys[other, 0] == keys[child, 0] and keys[other, 1] < keys[child, 1])
+        ):
+            child = other
+        if keys[child, 0] > first or (keys[child, 0] == first and keys[child, 1] >= second):
             break
-        nodes[at], place[below] = below, at
+        below = nodes[child]
+        nodes[at], keys[at, 0], keys[at, 1], place[below] = below, keys[child, 0], keys[child, 1], at
         at = child
-    nodes[at], place[node] = node, at
+    nodes[at], keys[at, 0], keys[at, 1], place[node] = node, first, second, at

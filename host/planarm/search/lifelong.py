@@ -95,7 +95,7 @@ def repair(graph: Digraph, bounds: Bounds, state: Lifelong) -> int:
         update(bounds, state, start)
     while heap.size[0] > 0:
         u = heap.nodes[0]
-        first, second = heap.keys[u, 0], heap.keys[u, 1]
+        first, second = heap.keys[0, 0], heap.keys[0, 1]
         limit = min(g[start], rhs[start]) + state.key_modifier[0]
         if first > limit + TIE * limit and rhs[start] <= g[start]:
             return DONE

@@ -44,18 +44,49 @@ def change_stored(
         How many nodes were cut off; TOO_MANY when more than `most` would be: then the edges have their costs, but the
         state is of no more use.
     """
-    follow_start(bounds, state)
     edges, costs = changed
-    count, falls = 0, False
+    roots, falls = change_costs(graph, state, edges, costs, branch, 0)
+    return cut_off(graph, bounds, state, edges if falls else edges[:0], most, branch, roots)
+
+
+@kernel
+def change_costs(
+    graph: Digraph, state: Lifelong, edges: Ints, costs: Floats, branch: Ints, roots: int
+) -> tuple[int, bool]:
+    """Give edges new costs, and cut the stored ways that lead over one that rose.
+
+    The nodes at which they are cut are added to `branch`, which holds `roots` of them; nothing else is done yet.
+
+    Returns:
+        (how many there are now, whether any edge fell).
+    """
+    falls = False
     for k in range(edges.shape[0]):
         e = edges[k]
         u, old = graph.tail[e], graph.cost[e]
         graph.cost[e] = costs[k]
         falls = falls or costs[k] < old
         if costs[k] > old and state.best[u] == graph.head[e] and u != state.ends[GOAL]:
-            state.best[u], branch[count] = CUT, u
-            count += 1
-    done = 0
+            state.best[u], branch[roots] = CUT, u
+            roots += 1
+    return roots, falls
+
+
+@kernel
+def cut_off(graph: Digraph, bounds: Bounds, state: Lifelong, fallen: Ints, most: int, branch: Ints, roots: int) -> int:
+    """Let all nodes forget whose stored ways are cut, and learn from the others; returns as `change_stored`.
+
+    Args:
+        graph: as there.
+        bounds: as there.
+        state: as there.
+        most: as there.
+        fallen: edges among which are those that fell.
+        branch: its first `roots` nodes are those at which the ways were cut.
+        roots: how many.
+    """
+    follow_start(bounds, state)
+    count, done = roots, 0
     while done < count:
         u = branch[done]
         done += 1
@@ -75,8 +106,8 @@ def change_stored(
     for k in range(count):
         compare_all(graph, state, branch[k])
         update(bounds, state, branch[k])
-    if falls:
-        _take_what_fell(graph, bounds, state, edges)
+    if fallen.shape[0]:
+        _take_what_fell(graph, bounds, state, fallen)
     return count
 
 
