@@ -8,7 +8,7 @@ from pathlib import Path
 from firmware_board import UNO, EmulatedFirmware
 from planarm_wire.boards import Board as Wiring
 
-SCHEDULED, STEP_1, STEP_2, RECEIVE, TRANSMIT = 7, 11, 12, 18, 19  # numbers of the vectors, from 0
+SCHEDULED, STEP_1, STEP_2, LAP, RECEIVE, TRANSMIT = 7, 11, 12, 13, 18, 19  # numbers of the vectors, from 0
 ENTRY_CYCLES = 4
 INTERRUPTS_ON = 0x80
 

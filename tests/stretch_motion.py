@@ -16,7 +16,7 @@ from planarm_wire.messages import TICKS_HZ, Move, Segment
 from planarm_wire.rates import need_code, rate_code, rate_value
 from planarm_wire.steps import duration_ticks, step_ticks
 
-SEGMENT_TICKS = 60_000
+SEGMENT_TICKS = 56_000
 ONE = 1 << 16
 MAX_STRETCH = 4096 << 16
 

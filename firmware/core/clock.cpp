@@ -17,13 +17,19 @@ uint32_t extend(uint16_t counter) {
     return latest_ticks;
 }
 
+// A lap that is due or counted while this looks begins it again. In this order: once it is counted it is due
+// no more.
 uint32_t now() {
+    uint8_t laps;
     uint16_t counter;
-    {
+    do {
+        laps = hal::laps();
         const hal::InterruptLock lock;
         counter = hal::counter();
-    }
-    return extend(counter);
+    } while (hal::lap_is_due() || laps != hal::laps());
+    const uint32_t ticks = (static_cast<uint32_t>(laps) << 16) | counter;
+    latest_ticks += (ticks - latest_ticks) & 0xFFFFFF;
+    return latest_ticks;
 }
 
 void begin_pass() { begun_ticks = now(); }

@@ -10,11 +10,12 @@ namespace clock {
 // Sets the clock to `ticks`, whose low 16 bits must be the timer's. For start-up.
 void reset(uint32_t ticks);
 
-// The 32-bit time of a reading of the timer. Right as long as one is made in every 65,536 ticks (4.1 ms).
-uint32_t extend(uint16_t counter);
-
-// Ticks now.
+// Ticks now. Right as long as it is asked for once a second; the watchdog comes earlier.
 uint32_t now();
+
+// The 32-bit time of a reading of the timer less than 65,536 ticks (4.1 ms) after the last time that was
+// told.
+uint32_t extend(uint16_t counter);
 
 // Looks at the clock for a pass of the main program: what follows are that moment's, for all that the pass
 // does.

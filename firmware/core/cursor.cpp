@@ -85,8 +85,8 @@ bool Cursor::find_last(Steps& steps) const {
     return steps.last_q16 >= time_q16;
 }
 
-// Those before a border so far away; the last slice of a segment takes all that are left. From slice to slice
-// their number changes little: the last one is a good guess, and step by step it becomes right.
+// Those before a border so far away; the last slice of a segment takes all that are left. From a guess their
+// number becomes right step by step.
 Cursor::Steps Cursor::steps_before(uint16_t path_ticks, bool ends_segment) const {
     const uint8_t most =
         left_ < step_engine::MAX_RUN_STEPS ? static_cast<uint8_t>(left_) : step_engine::MAX_RUN_STEPS;
@@ -118,7 +118,6 @@ Cursor::Steps Cursor::steps_before(uint16_t path_ticks, bool ends_segment) const
 
 void Cursor::advance(const Steps& steps) {
     left_ = static_cast<uint16_t>(left_ - steps.count);
-    guess_ = steps.count;
     const uint16_t last_low = static_cast<uint16_t>(steps.last_q16);
     at_.low = static_cast<uint16_t>(last_low + steps.interval_q16);
     at_.high += (steps.last_q16 >> 16) + (steps.interval_q16 >> 16) + (at_.low < last_low ? 1 : 0);
@@ -152,6 +151,11 @@ bool Cursor::take(const Slice& slice, Run& run) {
             fit(run, last_ticks - run.first_ticks, wanted);
         }
     }
+
+    // From slice to slice the number of steps changes little: where one run makes them all it is a good
+    // guess.
+    const bool whole = steps.count != step_engine::MAX_RUN_STEPS && first_path <= interval_q16_ >> 16;
+    guess_ = whole ? steps.count : 0;
 
     const bool near = has_moved_ && run.first_ticks - last_ticks_ <= MOST_AHEAD_TICKS;
     has_moved_ = true;

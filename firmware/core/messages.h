@@ -13,7 +13,7 @@ namespace wire {
 // Both ends must have the same.
 constexpr uint8_t PROTOCOL_VERSION = 2;
 // Of the specification without its wording.
-constexpr uint32_t SPEC_HASH = 0x94907170UL;
+constexpr uint32_t SPEC_HASH = 0x3F19A5D5UL;
 
 // Ends every frame.
 constexpr uint8_t DELIMITER = 0x7E;
@@ -70,9 +70,10 @@ constexpr uint8_t WATCHDOG_MS = 250;
 constexpr uint32_t DEBOUNCE_TICKS = 80000UL;
 // Largest interval inside a run of more than one step; longer gaps need a segment of their own.
 constexpr uint16_t MAX_INTERVAL_TICKS = 60000U;
-// The device cuts segments into equal slices of at most 3.9 ms, the last shorter by the rounding up
-// of the others. The path clock's rate changes from slice to slice.
-constexpr uint16_t SLICE_TICKS = 62500U;
+// The device cuts segments into equal slices of at most 3.6 ms, the last shorter by the rounding up
+// of the others. One run of a joint fills a slice at its least interval. The path clock's rate
+// changes from slice to slice.
+constexpr uint16_t SLICE_TICKS = 57000U;
 // Longest segment, about 67 s.
 constexpr uint32_t MAX_SEGMENT_TICKS = 1073741823UL;
 // Most steps of one joint in one segment.

@@ -46,9 +46,15 @@ void clear(uint8_t joint) {
     step_joints[joint].active = ring.runs;
 }
 
+// Without a lock, as it is asked for between the steps of all joints: what is read twice was not written in
+// between.
 Run* active_run(uint8_t joint) {
-    const hal::InterruptLock lock;
-    return step_joints[joint].active;
+    const StepJoint& read = step_joints[joint];
+    Run* seen;
+    do {
+        seen = read.active;
+    } while (seen != read.active);
+    return seen;
 }
 
 void take_back(uint8_t joint) {

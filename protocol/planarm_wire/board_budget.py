@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Final
 
-COMPARE_TICKS: Final = 79
+COMPARE_TICKS: Final = 75
 """A step that a compare output makes."""
-PORT_TICKS: Final = 91
+PORT_TICKS: Final = 84
 """A step on another pin by the same interrupt."""
 SHARED_TICKS: Final = 210
 """A step of joint 3 or 4, alone in their interrupt; two in one take less than twice as long."""

@@ -14,7 +14,7 @@ from planarm_wire.layout import EACH_JOINT, END, Field
 
 PROTOCOL_VERSION: Final = 2
 """Both ends must have the same."""
-SPEC_HASH: Final = 0x94907170
+SPEC_HASH: Final = 0x3F19A5D5
 """Hash of the specification without its wording."""
 DELIMITER: Final = 0x7E
 """Ends every frame."""
@@ -58,8 +58,8 @@ QUEUE_BYTES: Final = 896
 """Of the board uno: bytes of queued segments it holds; a SEGMENTS frame takes its payload and queue_frame_bytes."""
 QUEUE_FRAME_BYTES: Final = 1
 """Bytes that each queued SEGMENTS frame takes besides its payload."""
-MIN_INTERVAL_TICKS: Final = 246
-"""Of the board uno: least time between two steps of one joint, 65,041 steps/s; min_dir_setup_ticks more for a turn."""
+MIN_INTERVAL_TICKS: Final = 225
+"""Of the board uno: least time between two steps of one joint, 71,111 steps/s; min_dir_setup_ticks more for a turn."""
 NEED_UNIT_TICKS: Final = 32_768
 """Unit of a segment's need, 2.048 ms."""
 MAX_STRETCH: Final = 4_096
@@ -76,10 +76,10 @@ DEBOUNCE_TICKS: Final = 80_000
 """A limit switch counts when it stays so for this long, 5 ms."""
 MAX_INTERVAL_TICKS: Final = 60_000
 """Largest interval inside a run of more than one step; longer gaps need a segment of their own."""
-SLICE_TICKS: Final = 62_500
-"""The device cuts segments into equal slices of at most 3.9 ms, the last shorter by the rounding up of the others.
+SLICE_TICKS: Final = 57_000
+"""The device cuts segments into equal slices of at most 3.6 ms, the last shorter by the rounding up of the others.
 
-The path clock's rate changes from slice to slice.
+One run of a joint fills a slice at its least interval. The path clock's rate changes from slice to slice.
 """
 MAX_SEGMENT_TICKS: Final = 1_073_741_823
 """Longest segment, about 67 s."""
@@ -106,7 +106,7 @@ BOARDS: Final[dict[str, Board]] = {
         pin_map="own",
         joints=2,
         queue_bytes=896,
-        min_interval_ticks=246,
+        min_interval_ticks=225,
         step_pins=("D9", "D10"),
         dir_pins=("D4", "D5"),
         enable_pin="D8",

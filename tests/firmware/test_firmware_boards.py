@@ -47,7 +47,7 @@ FIFTEEN_K = TICKS_HZ // 15_000
 # Largest distance of a rise from its tick: 0 on a compare output, 12 us of joints 3 and 4; on the shield what may run
 # when a step of joint 1 or 2 is due.
 MOST_OFF_TICKS = {"uno_four": (0, 0, 192, 192), "cnc_shield": (160, 160), "cnc_shield_four": (480, 480, 192, 192)}
-LOOK_CYCLES, ONE_STEP_CYCLES, BOTH_CYCLES = (62, 76), (127, 210), (286, 288)
+LOOK_CYCLES, ONE_STEP_CYCLES, BOTH_CYCLES = (62, 76), (127, 210), (278, 288)
 
 
 def emulated(name: str) -> EmulatedFirmware:

@@ -12,8 +12,8 @@ from pathlib import Path
 
 import pytest
 
-from firmware_board import LEAD_TICKS, Board, end_motion, run_of, segment_of
-from firmware_tracer import INTERRUPTS_ON, RECEIVE, STEP_1, STEP_2, TRANSMIT, Tracer
+from firmware_board import LEAD_TICKS, Board, Schedule, end_motion, run_of, segment_of
+from firmware_tracer import INTERRUPTS_ON, LAP, RECEIVE, STEP_1, STEP_2, TRANSMIT, Tracer
 from planarm_wire.messages import STEP_PINS, Fault, Query, Segment, Segments, Start
 
 IMAGE = Path(__file__).parents[2] / "firmware" / "release" / "uno.hex"
@@ -24,6 +24,7 @@ MISSED_CYCLES = 82
 HIGH_CYCLES = range(56, 60)  # nothing else runs but an instruction of the main program
 RECEIVE_CYCLES, OVERRUN_CYCLES, FULL_CYCLES = 40, 44, 40
 TRANSMIT_CYCLES = (34, 36)
+LAP_CYCLES = 18
 
 
 @pytest.fixture
@@ -73,6 +74,7 @@ def test_step_interrupts(tracer: Tracer, joint: int) -> None:
     ]
     assert tracer.taken(RECEIVE) <= {RECEIVE_CYCLES}
     assert tracer.taken(TRANSMIT) <= set(TRANSMIT_CYCLES)
+    assert tracer.taken(LAP) == {LAP_CYCLES}
     if joint == 0:
         assert set(highs(board)) <= set(HIGH_CYCLES)
 
@@ -122,3 +124,29 @@ def test_receive_interrupt_without_room(tracer: Tracer) -> None:
 
     tracer.run_until(lambda: len(received()) == 130)
     assert received() == [*[RECEIVE_CYCLES] * 128, *[FULL_CYCLES] * 2]
+
+
+@pytest.mark.parametrize("ms", [5, 9, 13, 60, 200])
+def test_a_main_program_that_stands_still_latches_a_fault_and_makes_no_wrong_step(tracer: Tracer, ms: int) -> None:
+    # Longer than the 16-bit timer's turn of 4.1 ms, shorter than the watchdog: what is prepared is made, on its tick,
+    # and the rest is missed, since the clock counts the turns without the main program.
+    motion = end_motion([segment_of(900_000, run_of(899, interval=1000, first=0)) for _ in range(8)])
+    board = play(tracer, motion)
+    fast = super(Tracer, tracer).run
+    fast(1_500_000)
+    tracer.run_until(lambda: bool(tracer.chip.sreg & INTERRUPTS_ON))
+    code = tracer.uno.flash
+    back = tracer.chip.pc
+    tracer.chip.pc = next(word for word in range(len(code) // 2) if code[2 * word : 2 * word + 2] == JUMP_TO_ITSELF)
+    stop = tracer.chip.pc
+    fast(ms * 16_000)
+    tracer.run_until(lambda: tracer.chip.pc == stop)
+    tracer.chip.pc = back
+    tracer.run = fast  # type: ignore[method-assign]
+    board.run(10_000_000)
+    status = board.ask()
+    assert status.fault is Fault.MISSED_DEADLINE
+    planned = [tick for tick, _ in Schedule.of(motion).steps[0]]
+    rises = board.rises(0)
+    assert [rise - rises[0] for rise in rises] == planned[: len(rises)]
+    assert status.ledger.position_usteps[0] == len(rises)

@@ -206,9 +206,20 @@ def assert_every_edge(board: Board, motion: list[Segment], status: Status) -> No
         fast(320, 1.0037, 62_500, 75),
         fast(320, 1.0, 62_500, 75),
         fast(320, 1.618, 62_500, 75),
-        fast(246, 1.0, 250_000, 24),
+        fast(246, 65_041 / 65_000, 228_000, 24),
+        fast(MIN_INTERVAL_TICKS, 1.0037, 228_000, 24),
+        fast(MIN_INTERVAL_TICKS, 1.0, 228_000, 24),
     ],
-    ids=["20 k, both turn", "20 k and 12.4 k, both turn", "50 k and 49.8 k", "50 k", "50 k and 30.9 k", "65 k"],
+    ids=[
+        "20 k, both turn",
+        "20 k and 12.4 k, both turn",
+        "50 k and 49.8 k",
+        "50 k",
+        "50 k and 30.9 k",
+        "65,041 and 65,000",
+        "71 k, all phases",
+        "71 k",
+    ],
 )
 def test_full_rate_with_both_joints(
     emulated_firmware: EmulatedFirmware, motion: list[Segment], busy_line: bool
@@ -225,28 +236,26 @@ def test_full_rate_with_both_joints(
     assert_every_edge(board, motion, status)
 
 
-@pytest.mark.parametrize(
-    ("least_interval", "busy_line"), [(320, True), (246, False)], ids=["50 k, window always full", "65 k"]
-)
+@pytest.mark.parametrize("least_interval", [320, 246, MIN_INTERVAL_TICKS], ids=["50 k", "65 k", "71 k"])
 def test_a_random_motion(
-    emulated_firmware: EmulatedFirmware, least_interval: int, busy_line: bool, sized: Callable[[int, int], int]
+    emulated_firmware: EmulatedFirmware, least_interval: int, sized: Callable[[int, int], int]
 ) -> None:
-    # About 7 ms a segment: 1.7 s, or 10 s with --full.
+    # The window always full; about 7 ms a segment: 1.7 s, or 10 s with --full.
     motion = end_motion(restless(1, least_interval, sized(250, 1450)))
     board = Board(emulated_firmware)
     board.get_ready()
     for segment in motion[:16]:
         board.ask(Segments(0, 0, 0, (segment,)))
     board.ask(Start(LEAD_TICKS))
-    status = Streamer(board, motion[16:], busy_line).run(len(motion), 320_000_000)
+    status = Streamer(board, motion[16:], busy_line=True).run(len(motion), 320_000_000)
     assert (status.ring_full, status.crc_errors) == (0, 0)
     assert_every_edge(board, motion, status)
 
 
 @pytest.mark.parametrize(
     ("interval", "ratio"),
-    [(320, 1.0037), (246, 65_041 / 40_170), (256, 1.0)],
-    ids=["50,000 : 49,816", "65,041 : 40,170", "62,500 both"],
+    [(320, 1.0037), (246, 65_041 / 40_170), (246, 65_041 / 65_000), (MIN_INTERVAL_TICKS, 1.0037)],
+    ids=["50,000 : 49,816", "65,041 : 40,170", "65,041 : 65,000", "71,111 : 70,849"],
 )
 def test_constant_rates_on_a_saturated_line(
     emulated_firmware: EmulatedFirmware, interval: int, ratio: float, sized: Callable[[int, int], int]

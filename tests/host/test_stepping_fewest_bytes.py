@@ -38,7 +38,7 @@ def trains(sized):
 
 
 @pytest.mark.parametrize(
-    "fast_ticks", [SLICE_TICKS, 4 * SLICE_TICKS, MAX_SEGMENT_TICKS], ids=["3.9 ms", "15.6 ms", "no limit"]
+    "fast_ticks", [SLICE_TICKS, 4 * SLICE_TICKS, MAX_SEGMENT_TICKS], ids=["a slice", "four slices", "no limit"]
 )
 def test_bytes_are_within_five_percent_of_the_minimum(trains, fast_ticks, record_property):
     """On the line: each segment with its share of a frame. The minimum is of a slightly easier problem, see there."""

@@ -109,15 +109,15 @@ def test_reversals_are_found_between_gridpoints():
 @pytest.mark.parametrize(
     ("speed_rad_s", "words"),
     [
-        (30.0, r"joint 2 would step after \d+ ticks \([67]\d{4} steps/s\) .* 246 \(65041 steps/s\)"),
-        (60.0, r"joint 2 would make \d{6} steps/s at .* can make 65041"),
+        (30.0, r"joint 2 would step after \d+ ticks \(7\d{4} steps/s\) .* 225 \(71111 steps/s\)"),
+        (60.0, r"joint 2 would make \d{6} steps/s at .* can make 71111"),
     ],
 )
 def test_a_joint_that_is_too_fast_is_named_with_its_limit_and_setting(speed_rad_s, words):
     """2546 micro-steps a radian: 76 k steps/s are found at the step, 153 k before any step is located."""
     fast = joint(speed=speed_rad_s, acceleration=2000.0)
     made = time_path(joint_line((0.0, 0.0), (0.1, 2.0)), [fast, fast])
-    with pytest.raises(TimingError, match=words + r": lower joints\[2\].max_speed_deg_s to at most 1463"):
+    with pytest.raises(TimingError, match=words + r": lower joints\[2\].max_speed_deg_s to at most 1600"):
         quantise(made, [fast, fast])
 
 
@@ -152,8 +152,8 @@ def test_half_way_values_go_up():
 @pytest.mark.parametrize(
     ("ticks", "directions", "words"),
     [
-        ([1000, 1245], [1, 1], "245 ticks .*65306 steps/s.*max_speed_deg_s"),
-        ([1000, 1565], [1, -1], "reverse within 565 ticks .*max_acceleration_deg_s2"),
+        ([1000, 1224], [1, 1], "224 ticks .*71429 steps/s.*max_speed_deg_s"),
+        ([1000, 1544], [1, -1], "reverse within 544 ticks .*max_acceleration_deg_s2"),
         ([319, 2000], [1, 1], "319 ticks after .* DIR"),
         ([1000, 9000], [1, 1], "tick 9000, the motion ends at 9000"),
     ],

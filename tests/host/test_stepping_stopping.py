@@ -14,8 +14,9 @@ from planarm.stepping.slowing import shortfall_ticks
 from planarm.stepping.stopping import LARGEST_RATE_PER_S, allowances, least_of_neighbours, path_time_to_rest
 from planarm.stepping.table import table_of
 from planarm.trajectory.timing import time_path
+from planarm_wire.messages import SLICE_TICKS
 
-SLICE = 62_500
+SLICE = SLICE_TICKS
 ONE = joint(speed=2.0, acceleration=10.0)
 SCENE = replace(make_scene(), joints=(ONE, ONE))
 

@@ -136,6 +136,8 @@ uint16_t counter() {
     return static_cast<uint16_t>(uno.now);
 }
 
+uint8_t laps() { return static_cast<uint8_t>(uno.now >> 16); }
+
 uint16_t edge(uint8_t joint) { return uno.channels[joint].edge; }
 
 void set_edge(uint8_t joint, uint16_t tick) { uno.channels[joint].edge = tick; }

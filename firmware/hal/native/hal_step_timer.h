@@ -15,6 +15,7 @@ namespace board {
 void lock();
 void unlock();
 uint16_t counter();
+uint8_t laps();
 uint16_t edge(uint8_t joint);
 void set_edge(uint8_t joint, uint16_t tick);
 void arm(uint8_t joint, bool armed);  // the match toggles the pin, else it takes it low
@@ -44,6 +45,9 @@ class InterruptLock {
 inline void compiler_barrier() { InterruptLock(); }
 
 inline uint16_t counter() { return board::counter(); }
+
+inline uint8_t laps() { return board::laps(); }
+inline bool lap_is_due() { return false; }
 
 template <uint8_t JOINT>
 uint16_t step_edge() {

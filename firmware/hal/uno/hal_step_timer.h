@@ -36,6 +36,9 @@ constexpr Output output() {
 // COM bits with both channels disarmed; on other pins the compare outputs are left alone.
 constexpr uint8_t ALL_DISARMED = output<0>() == Output::COMPARE ? _BV(COM1A1) | _BV(COM1B1) : 0;
 
+// Timer1's interrupts while nothing steps.
+constexpr uint8_t ONLY_LAPS = _BV(TOIE1);
+
 // A joint that Timer2's interrupt steps.
 struct ScheduledJoint {
     uint16_t edge;
@@ -81,12 +84,19 @@ HAL_INLINE void compiler_barrier() { __asm__ __volatile__("" ::: "memory"); }
 inline void step_timer_init() {
     TCCR1A = ALL_DISARMED;
     TCNT1 = 0;
+    TIMSK1 = ONLY_LAPS;
     TCCR1B = _BV(CS10);
     if (planarm::wire::JOINTS > 2) TCCR2B = _BV(CS21) | _BV(CS20);  // a 32nd of the clock
 }
 
 // The timer's 16 bits. Interrupts must be off: they share the timer's TEMP register.
 HAL_INLINE uint16_t counter() { return TCNT1; }
+
+// How often the timer has gone round, modulo 256, as far as its interrupt has counted; and whether that is
+// about to come. The interrupt takes 18 cycles, once in 65,536.
+extern volatile uint8_t timer_laps;
+HAL_INLINE uint8_t laps() { return timer_laps; }
+HAL_INLINE bool lap_is_due() { return (TIFR1 & _BV(TOV1)) != 0; }
 
 // How much before its tick a step may rise.
 template <uint8_t JOINT>
@@ -222,7 +232,7 @@ HAL_INLINE bool step_interrupt_is_on() {
 // Disarms all channels and stops their interrupts; a pin that is high stays high.
 HAL_INLINE void steps_off() {
     TCCR1A = ALL_DISARMED;
-    TIMSK1 = 0;
+    TIMSK1 = ONLY_LAPS;
     if (planarm::wire::JOINTS > 2) scheduled_on = TIMSK2 = 0;
 }
 

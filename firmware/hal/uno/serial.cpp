@@ -157,9 +157,10 @@ ISR(USART_RX_vect, ISR_NAKED) {
         sts  %[tccra], r30
         ldi  r30, %[all_forced]
         sts  %[tccrc], r30
-        ldi  r30, 0
+        ldi  r30, %[only_laps]
         sts  %[timsk], r30
         .if %[joints] > 2
+        ldi  r30, 0
         sts  %[scheduled_on], r30
         sts  %[timsk2], r30
         .endif
@@ -175,9 +176,9 @@ ISR(USART_RX_vect, ISR_NAKED) {
         [full] "i"(&hal::ring_full), [overruns] "I"(_SFR_IO_ADDR(OVERRUNS)), [holds] "i"(&hal::holds),
         [repeats] "M"(planarm::wire::EMERGENCY_REPEATS), [all_disarmed] "i"(hal::ALL_DISARMED),
         [all_forced] "M"(_BV(FOC1A) | _BV(FOC1B)), [tccra] "i"(&TCCR1A), [tccrc] "i"(&TCCR1C),
-        [timsk] "i"(&TIMSK1), [line] "M"(static_cast<uint8_t>(hal::Emergency::LINE)),
-        [emergency] "i"(&hal::emergency_seen), [joints] "n"(planarm::wire::JOINTS),
-        [scheduled_on] "i"(&hal::scheduled_on), [timsk2] "i"(&TIMSK2));
+        [timsk] "i"(&TIMSK1), [only_laps] "M"(hal::ONLY_LAPS),
+        [line] "M"(static_cast<uint8_t>(hal::Emergency::LINE)), [emergency] "i"(&hal::emergency_seen),
+        [joints] "n"(planarm::wire::JOINTS), [scheduled_on] "i"(&hal::scheduled_on), [timsk2] "i"(&TIMSK2));
 }
 
 // The stop input's contact opened: what the last emergency byte does.

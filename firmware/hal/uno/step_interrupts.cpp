@@ -42,6 +42,7 @@ static_assert(static_cast<uint8_t>(Chain::REVERSED) == 2, "bit 1 finds a reversa
 static_assert(_SFR_MEM_ADDR(TCCR1C) == _SFR_MEM_ADDR(TCCR1A) + 2, "%[tccra] + 2");
 static_assert(_SFR_MEM_ADDR(TCNT1) == _SFR_MEM_ADDR(TCCR1A) + 4, "%[tccra] + 4");
 static_assert(_SFR_MEM_ADDR(TIMSK2) == _SFR_MEM_ADDR(TIMSK1) + 1, "%[timsk] + 1");
+static_assert(hal::ONLY_LAPS == 1, "what a missed step leaves on");
 static_assert(sizeof(Run*) == 2 && sizeof(bool) == 1, "widths of loads");
 // At a turn DIR's port is read before the pulse falls and written after it.
 static_assert(hal::output<0>() != hal::Output::COMPARE ||
@@ -169,9 +170,10 @@ HAL_INLINE void step_interrupt() {
         sts  %[missed], r30
         ldi  r30, %[all_disarmed]
         sts  %[tccra], r30
-        ldi  r30, 0
+        ldi  r30, 1                     ; hal::ONLY_LAPS
         sts  %[timsk], r30
         .if %[joints] > 2
+        ldi  r30, 0
         sts  %[scheduled_on], r30
         sts  %[timsk] + 1, r30
         .endif
@@ -247,7 +249,22 @@ void set_step_fraction<1>(uint16_t fraction) {
     __asm__ __volatile__("movw r14, %0" ::"r"(fraction));
 }
 
+volatile uint8_t timer_laps;
+
 }  // namespace hal
+
+ISR(TIMER1_OVF_vect, ISR_NAKED) {
+    __asm__ __volatile__(
+        R"(
+        in   r2, %[sreg]
+        lds  r3, %[laps]
+        inc  r3
+        sts  %[laps], r3
+        out  %[sreg], r2
+        reti
+        )" ::[sreg] "I"(_SFR_IO_ADDR(SREG)),
+        [laps] "i"(&hal::timer_laps));
+}
 
 ISR(TIMER1_COMPA_vect, ISR_NAKED) { step_interrupt<0>(); }
 

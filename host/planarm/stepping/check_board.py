@@ -31,7 +31,7 @@ QUEUED_HEAD_BYTES = 4.0
 """A frame's head in the queue."""
 
 LOAD_WINDOW_TICKS = 80_000
-MOST_LOAD = 0.75
+MOST_LOAD = 0.78
 AMBER_LOAD = 0.6
 """Share of the processor that interrupts may take in any 5 ms; the rest is the main program's, which prepares steps."""
 

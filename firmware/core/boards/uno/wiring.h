@@ -13,7 +13,7 @@ constexpr uint8_t JOINTS = 2;
 // Bytes of queued segments it holds; a SEGMENTS frame takes its payload and queue_frame_bytes.
 constexpr uint16_t QUEUE_BYTES = 896U;
 // Least time between two steps of one joint.
-constexpr uint8_t MIN_INTERVAL_TICKS = 246;
+constexpr uint8_t MIN_INTERVAL_TICKS = 225;
 // The pin map own.
 constexpr uint8_t PIN_MAP_CODE = 0;
 // Step outputs, one a joint, as numbered on the board.

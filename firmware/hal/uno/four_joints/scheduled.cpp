@@ -9,7 +9,7 @@
 // Like the interrupts of joints 0 and 1 (step_interrupts.cpp) it needs no stack and uses the registers that
 // no compiled code uses, but for the fractions in r12 to r15. Cycles with entry and jump, counted by
 // tests/firmware/test_firmware_boards.py: a look 62 to 76, one joint's step 127 to 210 with the looks before
-// and after it, both joints' 286 to 288.
+// and after it, both joints' 278 to 288.
 
 #include <avr/interrupt.h>
 #include <avr/io.h>
@@ -79,6 +79,7 @@ static_assert(offsetof(ScheduledJoint, edge) == 0 && offsetof(ScheduledJoint, fr
 static_assert(static_cast<uint8_t>(Chain::NONE) == 0 && static_cast<uint8_t>(Chain::REVERSED) == 2,
               "likewise");
 static_assert(hal::step_interrupt_mask<2>() == 0x10 && hal::step_interrupt_mask<3>() == 0x20, "bits of r3");
+static_assert(hal::ONLY_LAPS == 1, "what a missed step leaves on");
 static_assert(_SFR_MEM_ADDR(TIMSK2) == _SFR_MEM_ADDR(TIMSK1) + 1, "%[timsk] + 1");
 static_assert(_SFR_MEM_ADDR(TCNT2) == _SFR_MEM_ADDR(TCCR1A) + 0x32, "%[tccra] + 0x32");
 static_assert(_SFR_MEM_ADDR(OCR2A) == _SFR_MEM_ADDR(TCCR1A) + 0x33, "%[tccra] + 0x33");
@@ -264,8 +265,9 @@ ISR(TIMER2_COMPA_vect, ISR_NAKED) {
         sts  %[missed], r24
         ldi  r24, %[all_disarmed]
         sts  %[tccra], r24
-        ldi  r24, 0
+        ldi  r24, 1                            ; hal::ONLY_LAPS
         sts  %[timsk], r24
+        ldi  r24, 0
         sts  %[on], r24
     74: ldi  r24, 0
         sts  %[timsk] + 1, r24
