@@ -18,8 +18,9 @@ from planarm.operations.arrivals import Listed
 from planarm.operations.replanning import first_plan, run_live
 from planarm.scene import MechanicsSpec, Obstacle, load_scene
 from planarm.stepping.segments import expand
-from planarm_wire.messages import DIR_PINS, STEP_PINS, TICKS_HZ
+from planarm_wire.messages import TICKS_HZ
 
+EXAMPLES = Path(__file__).resolve().parents[1] / "examples"
 LENGTHS = (18.0, 26.0)
 START, GOAL = (-0.3, 0.9), (2.2, 0.5)
 SETTLE_S = 0.3
@@ -30,7 +31,7 @@ def scene_of():
 
     Motors follow their steps within about a millimetre, and swing after a stop: 3 mm of clearance are kept for that.
     """
-    scene = load_scene(Path(__file__).resolve().parents[1] / "examples" / "energy_two_links.toml")
+    scene = load_scene(EXAMPLES / "energy_two_links.toml")
     arm = replace(scene.arm, link_lengths_cm=LENGTHS)
     tips = [tuple(map(float, forward(Arm.from_spec(arm), q)[-1])) for q in (START, GOAL)]
     return replace(
@@ -45,8 +46,27 @@ def scene_of():
     )
 
 
+LINKS = {3: ((2.6, -0.35, 0.85), 0.8), 4: ((1.2, 0.3, -0.2, 0.1), 0.5)}
+"""Goal and joint speed of the scenes with three and four links: the queue of uno_four holds their stops."""
+
+
+def scene_with_links(links):
+    """An example with three or four links without its obstacles, and lighter, so that it hardly swings; on uno_four."""
+    scene = load_scene(EXAMPLES / f"{'three' if links == 3 else 'four'}_links.toml")
+    goal, speed_rad_s = LINKS[links]
+    tip = tuple(map(float, forward(Arm.from_spec(scene.arm), np.array(goal))[-1]))
+    return replace(
+        scene,
+        joints=tuple(replace(joint, max_speed_rad_s=speed_rad_s) for joint in scene.joints),
+        mechanics=replace(scene.mechanics, end_masses_kg=(0.03,) * links),
+        obstacles=(),
+        workspace=replace(scene.workspace, clearance_cm=0.3),
+        task=replace(scene.task, goal_rad=goal, goal_cm=tip),
+        roadmap=replace(scene.roadmap, nodes=2000, cost="time"),
+    )
+
+
 SCENE = scene_of()
-ARM = Arm.from_spec(SCENE.arm)
 
 
 def quiet(_stage, _share):
@@ -57,13 +77,14 @@ class Outcome:
     """One run on the emulated Uno, and what its arm really did."""
 
     def __init__(self, arrivals, scene=SCENE, beside=None):
+        self.scene, self.arm = scene, Arm.from_spec(scene.arm)
         first = first_plan(scene, quiet)
         setup = ArmSetup(scene, first[1].segments.start_usteps)
         with closing(open_transport("sim://", 250_000, setup)) as line:
             self.result = run_live(scene, line, Listed(arrivals), quiet, perf_counter, first, beside)
             line.arm.settle(SETTLE_S)
             self.record = line.arm.record()
-            pins = list(zip(STEP_PINS, DIR_PINS, strict=True))[: len(scene.joints)]
+            pins = list(zip(scene.board.step_pins, scene.board.dir_pins, strict=True))[: len(scene.joints)]
             self.measured = [measure_steps(waveform(line.pins, a), waveform(line.pins, b)) for a, b in pins]
 
     @property
@@ -84,27 +105,26 @@ class Outcome:
         """No contact with anything but what was unavoidable."""
         for one in self.result.encounters:
             if one.verdict != "unavoidable":
-                assert self.least_clearance_cm(one) > 0.5 * SCENE.arm.link_width_cm
+                assert self.least_clearance_cm(one) > 0.5 * self.scene.arm.link_width_cm
 
     def least_clearance_cm(self, encounter):
         """Of the links' centre lines from the obstacle, from its appearing on, by the emulated arm's own angles."""
         appeared = (self.result.began_s + encounter.at_s) * TICKS_HZ
         poses = self.record.q_rad[self.record.ticks >= appeared]
         obstacles = obstacle_set([shape_of(encounter.obstacle)])
-        return min(pose_clearance_cm(ARM, q, obstacles) for q in poses[::4])
+        return min(pose_clearance_cm(self.arm, q, obstacles) for q in poses[::4])
 
     def inside_at_once(self, encounter):
         """Whether the obstacle appeared where the arm was."""
         appeared = (self.result.began_s + encounter.at_s) * TICKS_HZ
         pose = self.record.q_rad[np.searchsorted(self.record.ticks, appeared)]
-        return (
-            pose_clearance_cm(ARM, pose, obstacle_set([shape_of(encounter.obstacle)])) <= 0.5 * SCENE.arm.link_width_cm
-        )
+        apart_cm = pose_clearance_cm(self.arm, pose, obstacle_set([shape_of(encounter.obstacle)]))
+        return apart_cm <= 0.5 * self.scene.arm.link_width_cm
 
 
 def tip_at(plan, share):
     q_rad, *_ = plan.trajectory.sample(np.array([share * plan.trajectory.duration_s]))
-    return forward(ARM, q_rad)[0, -1]
+    return forward(Arm.from_spec(plan.scene.arm), q_rad)[0, -1]
 
 
 def circle(x, y, diameter):

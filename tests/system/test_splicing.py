@@ -5,7 +5,7 @@ from time import perf_counter
 import numpy as np
 import pytest
 
-from live_runs import SCENE, Outcome, circle, quiet, tip_at
+from live_runs import SCENE, Outcome, circle, quiet, scene_with_links, tip_at
 from planarm.operations.beside import AsLong
 from planarm.operations.replanning import first_plan
 from planarm.scene.arrivals import Arrival
@@ -16,6 +16,8 @@ PLANNING_S = 0.08
 """What planning is said to take: runs are the same each time."""
 PIN_TICKS = 64
 """By how much a step at the pins may differ from its time."""
+INTERRUPT_TICKS = 192
+"""And one of joints 3 and 4, and of those beside them, which are stepped by interrupt."""
 
 
 def prompt():
@@ -129,3 +131,52 @@ def test_two_splices_in_one_motion(plan):
     assert told.max_timing_error_ticks <= PIN_TICKS
     assert not any(done.record.lost_full_steps)
     done.require_clear()
+
+
+def test_a_motion_from_where_the_arm_was_stopped_is_left_at_speed_too(plan):
+    """Its start is another than the scene's."""
+    x, y = tip_at(plan, 0.38)
+    stopping = Arrival(0.2 * plan.trajectory.duration_s, circle(x, y, 1.0))
+    stopped = Outcome([stopping], beside=prompt())
+    (one,), (rested,), second = stopped.result.encounters, stopped.result.new_plans, stopped.result.plans[-1]
+    assert one.stopped_because
+    assert rested.spliced_at_s is None
+    u, v = tip_at(second, 0.85)
+    done = Outcome([stopping, Arrival(one.at_s + rested.rest_s + 0.3, circle(u, v, 2.0))], beside=prompt())
+    assert [new.spliced_at_s is None for new in done.result.new_plans] == [True, False], done.result.encounters
+    assert done.result.reached, done.result.reason
+    assert done.result.plans[-1].scene.task.start_rad == second.scene.task.start_rad
+    assert not any(done.record.lost_full_steps)
+    done.require_clear()
+
+
+@pytest.mark.parametrize("links", [3, 4])
+def test_arms_of_three_and_four_links_go_on_at_speed(links, sized, capsys):
+    """Random obstacles at random times on uno_four: no lost step and no contact; the goal, or a reason."""
+    scene = scene_with_links(links)
+    first = first_plan(scene, quiet)[1]
+    assert first.certificate.ok, first.certificate.explain()
+    rng = np.random.default_rng(links)
+    verdicts, reached, spliced, on_time = [], 0, 0, 0
+    for number in range(sized(2, 40)):
+        share = float(rng.uniform(0.05, 0.5))
+        near = tip_at(first, min(1.0, share + float(rng.uniform(0.25, 0.6)))) + rng.normal(0.0, 2.0, 2)
+        arrival = Arrival(share * first.trajectory.duration_s, circle(*near, rng.uniform(1.0, 3.0)))
+        done = Outcome([arrival], scene, prompt())
+        verdicts += [one.verdict for one in done.result.encounters]
+        reached += done.result.reached
+        assert done.result.reached or done.result.reason, (number, arrival)
+        assert not any(done.record.lost_full_steps), (number, arrival)
+        assert not done.record.broken_rules, (number, arrival)
+        done.require_clear()
+        if done.spliced and len(done.spliced) == len(done.result.new_plans):
+            spliced += 1
+            told = done.comparison()
+            assert told.agrees, (number, told.explain())
+            on_time += told.max_timing_error_ticks <= INTERRUPT_TICKS
+            assert done.longest_pause_s() < 0.1, (number, arrival)
+    if len(verdicts) >= 40:
+        assert spliced > 0.2 * len(verdicts)
+        with capsys.disabled():
+            counts = {verdict: verdicts.count(verdict) for verdict in ("kept", "avoided", "unavoidable")}
+            print(f"\n{links} links: {counts}, goal reached {reached}, left at speed {spliced}, on time {on_time}")

@@ -36,7 +36,7 @@ from planarm.model.kinematics import forward
 from planarm.model.shapes import shape_of
 from planarm.model.transmission import Transmission
 from planarm.operations.beside import AsLong, Beside, InThread
-from planarm.operations.splicing import Border, first_border, plan_from_border, why_not
+from planarm.operations.splicing import Border, borders_from, first_border, plan_from_borders, why_not
 from planarm.operations.verdicts import Verdict, contact_time_s, judge_contact, whereabouts_s
 from planarm.pipeline import Notice, plan_scene, planning_margin_cm
 from planarm.plan import Plan
@@ -130,10 +130,11 @@ class _Splice:
     """A motion that is to be left, and the work on the one that follows."""
 
     border: Border
+    """Nothing behind it is sent."""
     contact_s: float
     """Path time at which the old motion would meet an obstacle."""
     noticed_s: float
-    work: Future[Plan]
+    work: Future[tuple[Plan, Border]]
     stale: bool = False
     """Another obstacle has come since the work began."""
 
@@ -223,12 +224,14 @@ class _Run:
         if border.path_s >= contact_s:
             return "it is before where the motion could be left"
         stream.keep_back(border.segment)
-        self.splice = _Splice(border, contact_s, now_s, self._begin(border, least_s, now_s))
+        self.splice = _Splice(border, contact_s, now_s, self._begin(border, contact_s, least_s, now_s))
         return ""
 
-    def _begin(self, border: Border, from_s: float, now_s: float) -> Future[Plan]:
+    def _begin(self, first: Border, contact_s: float, from_s: float, now_s: float) -> Future[tuple[Plan, Border]]:
         """Begin to plan a motion that leaves the one that streams."""
-        work = partial(plan_from_border, self.scene, self.task, self.plan, border, from_s, self.margin_cm)
+        scene = replace(self.plan.scene, obstacles=self.scene.obstacles)  # it began where this leg began
+        borders = borders_from(self.plan, first, contact_s)
+        work = partial(plan_from_borders, scene, self.task, self.plan, borders, from_s, self.margin_cm)
         return self.beside.begin(work, now_s)
 
     def _end_splice(self, stream: Stream, splice: _Splice, now_s: float) -> None:
@@ -237,16 +240,17 @@ class _Run:
         self.splice = None
         self._tell_roadmap()
         if splice.stale:
-            self.splice = replace(splice, work=self._begin(splice.border, least_s, now_s), stale=False)
+            work = self._begin(splice.border, splice.contact_s, least_s, now_s)
+            self.splice = replace(splice, work=work, stale=False)
             return
         try:
-            plan = splice.work.result()
+            plan, border = splice.work.result()
         except (NoPathError, SceneError, TimingError, CertificateError) as error:
             _, quick = judge_contact(self.plan, splice.contact_s, most_s)
             self._stop(stream, "avoided", quick, str(error), splice.noticed_s)
             return
         stream.go_on_with(plan.segments.segments, plan.segments.allowances)
-        self.take(plan, NewPlan(0.0, 1e3 * (now_s - splice.noticed_s), splice.border.path_s))
+        self.take(plan, NewPlan(0.0, 1e3 * (now_s - splice.noticed_s), border.path_s))
 
     def _stop(self, stream: Stream, verdict: Verdict, quick: bool, because: str, noticed_s: float) -> None:
         stream.stop(quick=quick)
@@ -276,7 +280,7 @@ def run_live(
     """Carry a scene out on a board while obstacles may appear.
 
     Args:
-        scene: two links, a planner on a roadmap.
+        scene: one to four links, a planner on a roadmap.
         transport: to the board.
         obstacles: asked at every pass while the arm moves.
         notice: told the progress of planning.
@@ -347,6 +351,8 @@ def _stream_leg(run: _Run) -> tuple[Floats, Verdict | None]:
     """Stream the plan until it is done or stopped; return where the arm rests, and the verdict that stopped it."""
     run.begin_leg()
     plan = run.plan
+    if not plan.certificate.ok:
+        raise CertificateError(f"{plan.scene.source}: the plan is not certified: {plan.certificate.explain()}")
     options = replace(options_for(plan.scene, plan.segments), ahead_s=AHEAD_S)
     start = np.array(plan.segments.start_usteps)
     try:
@@ -356,7 +362,7 @@ def _stream_leg(run: _Run) -> tuple[Floats, Verdict | None]:
         if run.stopping is None:
             raise
         moved = error.position.moved_usteps
-    at: Floats = Transmission.of(plan.scene).q_rad(start + np.array(moved))
+    at: Floats = Transmission.of(plan.scene).q_rad(start + np.array(moved[: len(start)]))
     return at, run.stopping
 
 

@@ -13,7 +13,7 @@ and the border is chosen before the obstacle.
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from math import ceil
@@ -52,6 +52,9 @@ MOST_CORNERS = 6
 """Corners of the old way up to which it may be left."""
 BETWEEN_RAD = 0.15
 """Between corners it may be left about so often."""
+MOST_BORDERS = 4
+APART_S = 0.06
+"""A motion that cannot be left at the first border is tried to be left later, so far apart."""
 MOST_TRIES = 3
 """Of the ways that can be reached at the speed, the cheapest first, how many are encoded and certified."""
 
@@ -101,6 +104,34 @@ def first_border(plan: Plan, sent: int, ready_s: float) -> Border | None:
             wanted = max(wanted, last_slice + SLICE_TICKS + allowance.need_ticks + MARGIN_TICKS)
         ticks = end
     return None
+
+
+def borders_from(plan: Plan, first: Border, before_s: float) -> list[Border]:
+    """Return borders at which a motion may be left, from the first possible one on, before a path time."""
+    found, ticks = [first], 0
+    for k, segment in enumerate(plan.segments.segments):
+        if k > first.segment and ticks >= found[-1].tick + APART_S * TICKS_HZ and ticks < before_s * TICKS_HZ:
+            found.append(Border(k, ticks))
+        ticks += duration_ticks(segment)
+    return found[:MOST_BORDERS]
+
+
+def plan_from_borders(
+    scene: Scene, task: RoadmapTask, before: Plan, borders: Sequence[Border], from_s: float, margin_cm: float
+) -> tuple[Plan, Border]:
+    """Return a motion that leaves `before` at the first of some borders at which that is possible, and that border.
+
+    Raises:
+        NoPathError, TimingError, CertificateError: as `plan_from_border`, for the last of them.
+    """
+    for border in borders[:-1]:
+        try:
+            return plan_from_border(scene, task, before, border, from_s, margin_cm), border
+        except (TimingError, CertificateError):
+            continue  # the next one leaves more room to slow down
+        except NoPathError:
+            break
+    return plan_from_border(scene, task, before, borders[-1], from_s, margin_cm), borders[-1]
 
 
 def plan_from_border(

@@ -44,13 +44,13 @@ def check_stop(plan: SegmentPlan, table: SegmentTable, planned: Planned, scene: 
         return checks
     starts = table.starts
     setting = "joints.max_acceleration_deg_s2"
-    by_torque, borders_s = _torque_changes(planned, scene), starts / TICKS_HZ
-    inner_s = planned.t_s[1:-1]
+    inner_s, borders_s = planned.t_s[1:-1], starts / TICKS_HZ
+    looked = _looked_at(inner_s, borders_s)
+    by_torque = _torque_changes(planned, scene, looked)
     for name, column, sign in (("slowing", 0, 1.0), ("speeding up", 1, -1.0)):
-        largest = np.minimum(
-            _least_in(_largest_changes(planned, scene, sign), inner_s, borders_s),
-            _least_in(np.interp(inner_s, inner_s[::STRIDE], by_torque[column]), inner_s, borders_s),
-        )
+        torque = np.full(len(inner_s), np.inf)
+        torque[looked] = by_torque[column]
+        largest = _least_in(np.minimum(_largest_changes(planned, scene, sign), torque), inner_s, borders_s)
         beyond = told[:, column] / np.maximum(largest, 1e-9)
         k = int(np.argmax(beyond))
         where = f"segment {k}, {_time(starts[k])}"
@@ -58,7 +58,8 @@ def check_stop(plan: SegmentPlan, table: SegmentTable, planned: Planned, scene: 
         checks.append(at_most(told_of, beyond[k], 1.0 + ROUNDING, "", where, setting))
     needs_s = told[:, 2] / TICKS_HZ
     at, owner = _slices(table)
-    beyond_s = _stops_s(planned, scene, at / TICKS_HZ, by_torque[0]) - needs_s[owner]
+    slowing = np.minimum(_largest_changes(planned, scene, 1.0), np.interp(inner_s, inner_s[looked], by_torque[0]))
+    beyond_s = _stops_s(planned, scene, at / TICKS_HZ, slowing) - needs_s[owner]
     k = int(np.argmax(beyond_s))
     where = f"segment {owner[k]}, {_time(int(at[k]))}"
     slice_s = SLICE_TICKS / TICKS_HZ
@@ -126,14 +127,24 @@ def _largest_changes(planned: Planned, scene: Scene, sign: float) -> Floats:
     return most
 
 
-def _torque_changes(planned: Planned, scene: Scene) -> Floats:
-    """Return the largest slowing and speeding up of the path clock by the torque, every STRIDE times, shape (2, n).
+def _looked_at(inner_s: Floats, borders_s: Floats) -> Ticks:
+    """Return at which inner times torque is looked at: every STRIDE-th, and the first and the last of each segment.
+
+    Torque jumps where accelerations do, so what is between two of these times is no mean of them.
+    """
+    first, after = _within(inner_s, borders_s)
+    some = first < after
+    return np.asarray(np.unique(np.concatenate([np.arange(0, len(inner_s), STRIDE), first[some], after[some] - 1])))
+
+
+def _torque_changes(planned: Planned, scene: Scene, looked: Ticks) -> Floats:
+    """Return the largest slowing and speeding up of the path clock by the torque at inner times, shape (2, n).
 
     At the rate u of the clock speeds are u times the planned ones and torques of motion u^2 times, and its change asks
     for what accelerations as large as the speeds would.
     """
-    speeds = (0.5 * (planned.speeds_rad_s[1:] + planned.speeds_rad_s[:-1]))[::STRIDE]
-    accelerations, q_rad = planned.accelerations_rad_s2[::STRIDE], planned.q_rad[1:-1:STRIDE]
+    speeds = (0.5 * (planned.speeds_rad_s[1:] + planned.speeds_rad_s[:-1]))[looked]
+    accelerations, q_rad = planned.accelerations_rad_s2[looked], planned.q_rad[1:-1][looked]
     lengths, still = scene.arm.link_lengths_cm, np.zeros_like(speeds)
 
     def joints_nm(speeds: Floats, accelerations: Floats) -> Floats:
@@ -160,14 +171,23 @@ def _least_in(values: Floats, t_s: Floats, borders_s: Floats) -> Floats:
 
     A value at t is that of differences over its neighbours, so all three have to lie in the segment.
     """
-    step_s = t_s[1] - t_s[0]
-    first = np.searchsorted(t_s, borders_s[:-1] + step_s)
-    after = np.searchsorted(t_s, borders_s[1:] - step_s, side="right")
-    ranges = zip(first.tolist(), after.tolist(), strict=True)
+    ranges = zip(*(ends.tolist() for ends in _within(t_s, borders_s)), strict=True)
     return np.array([values[a:b].min() if a < b else np.inf for a, b in ranges])
 
 
-def _stops_s(planned: Planned, scene: Scene, starts_s: Floats, by_torque: Floats) -> Floats:
+def _within(t_s: Floats, borders_s: Floats) -> tuple[Ticks, Ticks]:
+    """Return the first time of each segment that lies in it with both its neighbours, and the first that no more does.
+
+    Where there is none, the first is not less than the other.
+    """
+    step_s = t_s[1] - t_s[0]
+    return (
+        np.searchsorted(t_s, borders_s[:-1] + step_s),
+        np.searchsorted(t_s, borders_s[1:] - step_s, side="right"),
+    )
+
+
+def _stops_s(planned: Planned, scene: Scene, starts_s: Floats, slowing: Floats) -> Floats:
     """Return the path time of a stop from each start with all of the slowing there is."""
     speeds = 0.5 * (planned.speeds_rad_s[1:] + planned.speeds_rad_s[:-1])
     over = np.zeros(len(speeds))
@@ -175,8 +195,7 @@ def _stops_s(planned: Planned, scene: Scene, starts_s: Floats, by_torque: Floats
     for motor, axis in enumerate(motor_axes(scene.joints, scene.coupling)):
         over = np.maximum(over, rates[:, motor] / np.sqrt(2.0 * axis.max_acceleration_rad_s2 * axis.usteps_per_rad))
     first: Ticks = np.searchsorted(planned.t_s[1:-1], starts_s)
-    most = np.interp(planned.t_s[1:-1], planned.t_s[1:-1:STRIDE], by_torque)
-    return integrate_stops(np.minimum(_largest_changes(planned, scene, 1.0), most), over, first, float(planned.t_s[1]))
+    return integrate_stops(slowing, over, first, float(planned.t_s[1]))
 
 
 @kernel

@@ -41,12 +41,12 @@ tightened where it exceeds a limit; from SLOW_BELOW on, or after ROUNDS, the who
 GROWTH = 2.0
 """How many times the squared path speed of a solution the next may have while torque limits it."""
 
-START_SLACK = 0.02
+START_SLACK = 0.1
 """Share of the squared rate at a motion's start by which a grid may be too coarse to have it; refinement settles it."""
 
-MOST_BEYOND = 1.0 + 5e-5
-"""A motion that begins at speed is not run slower as a whole, so it may exceed what is planned with by this; limits are
-planned with to a ten-thousandth (`limits.HEADROOM`)."""
+SPEED_BEYOND, FORCE_BEYOND = 1.0 + 5e-5, 1.01
+"""A motion that begins at speed is not run slower as a whole, so it may exceed what is planned with by this: speeds are
+planned with to a ten-thousandth (`limits.HEADROOM`), and of accelerations and torques a share is left for stops."""
 
 SETTLED_SHARE = 1e-4
 """The torque's estimate is good enough when drawing it anew changes the duration by less than this share."""
@@ -121,10 +121,9 @@ def _refined(
         grid = _refine(grid, trajectory, use, coarse, np.inf if limits.load is None else GROWTH)
         trajectory = solve(path, grid, limits, speed_cap, start_rate)
         use = limit_use(trajectory, limits, grid.samples)
-    factor = _slowing(use)
     if start_rate == 0.0:
-        return grid, _slowed(trajectory, factor)
-    if factor > MOST_BEYOND:
+        return grid, _slowed(trajectory, _slowing(use))
+    if use.speed.max() > SPEED_BEYOND or max(use.acceleration.max(), use.torque.max()) > FORCE_BEYOND:
         place = path.place(float(grid.s[int(np.argmax(_most(use)))]))
         raise TimingError(f"a motion that begins at speed cannot keep the joints' limits at {place}")
     return grid, trajectory
