@@ -10,6 +10,7 @@ namespace {
 // the 16-bit timer must tell early from late.
 constexpr uint32_t MOST_AHEAD_TICKS = 32000;
 constexpr uint32_t MOST_AHEAD_Q16 = MOST_AHEAD_TICKS << 16;
+constexpr uint32_t LEAST_Q16 = static_cast<uint32_t>(wire::MIN_INTERVAL_TICKS) << 16;
 
 // Intervals of a run, in 2^-16 ticks.
 struct Intervals {
@@ -27,20 +28,24 @@ Intervals stretched(const Slice& slice, const Intervals& path, uint16_t first_pa
             multiply_q16(path.last, slice.stretch_at(last_middle))};
 }
 
-// Intervals that bring the run's steps over `span_ticks`, exactly, and grow as `wanted` does.
-void fit(Run& run, uint32_t span_ticks, const Intervals& wanted) {
+// Intervals that bring the run's steps over `span_ticks`, exactly, and grow as `wanted` does, or less where
+// one of them would be shorter than the joint can step. False when the step interrupt cannot bridge them.
+bool fit(Run& run, uint32_t span_ticks, const Intervals& wanted) {
     const uint8_t intervals = static_cast<uint8_t>(run.steps - 1);
     const uint32_t mean_q16 = hal::divide_q16(span_ticks, intervals);
     run.interval_q16 = mean_q16;
     run.add_q16 = 0;
-    if (intervals == 1) return;
+    if (intervals == 1) return mean_q16 <= MOST_AHEAD_Q16;
     const bool shrinks = wanted.last < wanted.first;
-    const uint32_t growth = shrinks ? wanted.first - wanted.last : wanted.last - wanted.first;
+    uint32_t growth = shrinks ? wanted.first - wanted.last : wanted.last - wanted.first;
+    const uint32_t room = mean_q16 > LEAST_Q16 ? mean_q16 - LEAST_Q16 : 0;
+    if (growth >> 1 > room) growth = room << 1;
     const uint8_t changes = static_cast<uint8_t>(intervals - 1);
     const uint32_t add = hal::divide_q16(growth >> 16, changes);  // whole ticks of the growth are enough
     const uint32_t half = multiply(add, changes).low / 2 + (multiply(add, changes).high << 15);
     run.add_q16 = shrinks ? 0 - add : add;
     run.interval_q16 = shrinks ? mean_q16 + half : mean_q16 - half;
+    return mean_q16 + half <= MOST_AHEAD_Q16;
 }
 
 }  // namespace
@@ -64,9 +69,10 @@ bool Cursor::is_calm(const Slice& slice, uint32_t start_stop_ticks) const {
     uint32_t least = has_moved_ ? at_.high - last_path_ticks_ : 0xFFFFFFFF;
     if (slice.is_plain() && least < start_stop_ticks) return false;  // as a rule
     if (left_ > 1) {
-        const uint32_t change = multiply(static_cast<uint32_t>(add_q16_ < 0 ? -add_q16_ : add_q16_),
-                                         static_cast<uint16_t>(left_ - 2))
-                                    .high;
+        const uint32_t change =
+            multiply(add_q16_ < 0 ? 0 - static_cast<uint32_t>(add_q16_) : static_cast<uint32_t>(add_q16_),
+                     static_cast<uint16_t>(left_ - 2))
+                .high;
         const uint32_t first = interval_q16_ >> 16;
         const uint32_t last = add_q16_ < 0 ? first - change - 1 : first;
         if (last < least) least = last;
@@ -130,10 +136,6 @@ bool Cursor::take(const Slice& slice, Run& run) {
     const uint16_t first_path = slice.path_of(at_.high);
     const uint16_t last_path = static_cast<uint16_t>(first_path + (steps.last_q16 >> 16));
     if (steps.count > 1 && !slice.is_plain()) wanted = stretched(slice, wanted, first_path, last_path);
-    if (steps.count > 1 && !are_near(wanted)) {
-        steps.count = 1;
-        find_last(steps);
-    }
 
     run.positive = positive_;
     run.steps = steps.count;
@@ -141,15 +143,20 @@ bool Cursor::take(const Slice& slice, Run& run) {
     run.interval_q16 = interval_q16_;
     run.add_q16 = static_cast<uint32_t>(add_q16_);
     run.first_ticks = slice.ticks_at(first_path);
-    uint32_t last_ticks = run.first_ticks;
-    if (steps.count == 1) {
+    uint32_t last_ticks = slice.ticks_at(last_path);
+    bool fits = steps.count == 1 || are_near(wanted);
+    if (!slice.is_plain() && fits && steps.count > 1) {
         run.fraction = 0;
-    } else {
-        last_ticks = slice.ticks_at(last_path);
-        if (!slice.is_plain()) {
-            run.fraction = 0;
-            fit(run, last_ticks - run.first_ticks, wanted);
-        }
+        fits = fit(run, last_ticks - run.first_ticks, wanted);
+    }
+    if (!fits) {
+        steps.count = 1;
+        find_last(steps);
+    }
+    if (steps.count == 1) {
+        run.steps = 1;
+        run.fraction = 0;
+        last_ticks = run.first_ticks;
     }
 
     // From slice to slice the number of steps changes little: where one run makes them all it is a good

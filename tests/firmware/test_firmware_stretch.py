@@ -12,7 +12,18 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from firmware_board import LEAD_TICKS, WAKE_TICKS, Board, EmulatedFirmware, Firmware, NativeFirmware, Schedule
+from firmware_board import (
+    LEAD_TICKS,
+    WAKE_TICKS,
+    Board,
+    EmulatedFirmware,
+    Firmware,
+    NativeFirmware,
+    Schedule,
+    end_motion,
+    run_of,
+    segment_of,
+)
 from planarm_wire.codec import encoded_bytes
 from planarm_wire.messages import (
     HOLD_CODE,
@@ -250,6 +261,37 @@ def test_stop_drops_the_rest_and_keeps_the_position(firmware: Firmware, quick: i
     player.board.run(2_000_000)
     assert tuple(player.board.position_at(joint, player.board.now) for joint in range(JOINTS)) == made
     assert player.board.ask(Start(LEAD_TICKS)).state is State.READY, "nothing is queued any more"
+
+
+@pytest.mark.parametrize("phase", range(0, 60_000, 15_000))
+@pytest.mark.parametrize(
+    ("first", "add", "steps"), [(1000, 2142, 8), (300, 60, 40), (6000, 1800, 6), (16_000, -2000, 5)]
+)
+def test_a_hold_where_intervals_change_much(
+    native_firmware: NativeFirmware, first: int, add: int, steps: int, phase: int
+) -> None:
+    # The stretch doubles from slice to slice: of growing intervals the first would be fitted below nothing, of
+    # shrinking ones the mean above both ends. The hold rests, and RESUME makes every step.
+    board = Board(native_firmware)
+    board.hello()
+    board.ask(Config(PinMap.OWN, JOINTS, 0, 0, 0, 160_000, 0, (160_000, 160_000)))
+    board.ask(Enable(1))
+    board.run(WAKE_TICKS)
+    motion = end_motion([segment_of(62_500, run_of(steps, first=0, interval=first, add=add))] * 20)
+    for segment in motion:
+        board.ask(Segments(0xFF, 0xFF, 0, (segment,)))
+    board.send(Start(LEAD_TICKS))
+    board.run(LEAD_TICKS + 300_000 + phase)
+    board.receive(bytes([HOLD_CODE]))
+    board.run(200_000_000)
+    status = board.ask()
+    assert (status.state, status.fault) == (State.HELD, Fault.NONE)
+    assert status.ledger.position_usteps[0] == len(board.rises(0)) < 20 * steps
+    board.send(Resume())
+    board.run(400_000_000)
+    status = board.ask()
+    assert (status.state, status.fault) == (State.READY, Fault.NONE)
+    assert status.ledger.position_usteps[0] == len(board.rises(0)) == 20 * steps
 
 
 def test_hold_on_the_emulated_chip(emulated_firmware: EmulatedFirmware) -> None:

@@ -101,11 +101,16 @@ def test_a_program_that_uses_a_register_of_the_interrupts_is_refused(tmp_path: P
     assert "uses a register of the interrupts" in done.stderr
 
 
-LOCK_CYCLES = {"uno": 11, "uno_four": 25}
+LOCK_CYCLES = {"uno": 13, "uno_four": 27}
+# Around the start of a joint at rest, what rests, and what ends a motion; the other joint may step.
+LONG_LOCK_CYCLES = {"serve": 50, "freeze": 80, "stop": 30}
 
 
 def locked_cycles(listing: str) -> dict[str, int]:
-    """The longest stretch from CLI to the instruction behind the one that lets interrupts in again, by function."""
+    """The longest stretch from CLI to the second instruction behind the one that lets interrupts in again, by function.
+
+    One of those comes before the next interrupt, one after it.
+    """
     two = {"lds", "sts", "ld", "ldd", "st", "std", "push", "pop", "sbi", "cbi", "sbiw", "adiw", "rjmp", "mul"}
     found: dict[str, int] = {}
     for function in listing.split("\n\n"):
@@ -120,7 +125,7 @@ def locked_cycles(listing: str) -> dict[str, int]:
             if end is None:
                 assert "<_exit>" in title, f"{title}: locked to its end"
                 continue
-            cycles = [4 if one in ("ret", "call", "rcall") else 2 if one in two else 1 for one, _ in code[at : end + 2]]
+            cycles = [4 if one in ("ret", "call", "rcall") else 2 if one in two else 1 for one, _ in code[at : end + 3]]
             found[title] = max(found.get(title, 0), sum(cycles))
     return found
 
@@ -128,7 +133,7 @@ def locked_cycles(listing: str) -> dict[str, int]:
 @needs_avr_gcc
 @pytest.mark.parametrize("board", ["uno", "uno_four"])
 def test_locks_that_are_met_while_joints_step_are_short(tmp_path: Path, board: str) -> None:
-    # firmware/README.md, budgets: 11 cycles. Longer are only those around a joint that does not step meanwhile.
+    # firmware/README.md, budgets: 11 cycles and 2.
     build("avr", tmp_path)
     listing = subprocess.run(
         ["avr-objdump", "-d", "-C", "--no-show-raw-insn", str(tmp_path / f"{board}.elf")],
@@ -138,9 +143,9 @@ def test_locks_that_are_met_while_joints_step_are_short(tmp_path: Path, board: s
     ).stdout
     locked = locked_cycles(listing)
     assert len(locked) >= 4
-    at_rest = ("step_engine::serve", "step_engine::freeze", "step_engine::stop", "start_when_due")
-    longer = {title: cycles for title, cycles in locked.items() if cycles > LOCK_CYCLES[board]}
-    assert all(any(name in title for name in at_rest) for title in longer), longer
+    for title, cycles in locked.items():
+        allowed = [most for name, most in LONG_LOCK_CYCLES.items() if f"step_engine::{name}(" in title]
+        assert cycles <= max([LOCK_CYCLES[board], *allowed]), title
 
 
 @needs_gxx

@@ -15,8 +15,10 @@
 //   going idle                73       56
 //   a step missed             82
 // tests/firmware/test_firmware_cycles.py counts them. The least interval of one joint covers what may run
-// when its step rises: the receive interrupt (40), a lock of the main program (11), the other joint's
-// interrupt (75, in a turn 77), its own way to the look at the timer (58), and what that asks for (38): 224.
+// when its step rises: what is left of a receive interrupt that has begun (39), a lock of the main program
+// (11), the other joint's interrupt (in a turn 77), the one instruction that comes between two interrupts
+// (2), its own way to the look at the timer (58), and what that asks for (38): 225, all of it. So a lock and
+// the two instructions behind it may take 13 cycles: tests/firmware/test_release.py looks at each.
 // From a step to one back the look comes after 59 and asks for the DIR setup time (320).
 
 #include <avr/interrupt.h>
