@@ -6,6 +6,7 @@
 #include "home.h"
 #include "motion.h"
 #include "power.h"
+#include "settings.h"
 #include "step_engine.h"
 #include "supervisor.h"
 
@@ -72,10 +73,10 @@ Result config(const wire::Config& told) {
     }
     const Result result = try_event(Event::CONFIG);
     if (result != Result::OK) return result;
-    power::configure({told.options, told.idle_ms, told.wake_ticks});
-    hal::watch_stop_input(power::has_option(power::STOP_INPUT));
+    settings::config = told;
+    power::configure();
+    hal::watch_stop_input(settings::has_option(settings::STOP_INPUT));
     for (uint8_t joint = 0; joint < wire::JOINTS; ++joint) {
-        motion::joints[joint].start_stop_ticks = told.start_stop_ticks[joint];
         step_engine::set_dir_inverted(joint, ((told.dir_inverted >> joint) & 1) != 0);
     }
     return Result::OK;
@@ -83,12 +84,8 @@ Result config(const wire::Config& told) {
 
 Result soft_limits(const wire::SoftLimits& told) {
     const Result result = try_event(Event::SOFT_LIMITS);
-    if (result != Result::OK) return result;
-    for (uint8_t joint = 0; joint < wire::JOINTS; ++joint) {
-        motion::joints[joint].least_usteps = told.least_usteps[joint];
-        motion::joints[joint].most_usteps = told.most_usteps[joint];
-    }
-    return Result::OK;
+    if (result == Result::OK) settings::soft_limits = told;
+    return result;
 }
 
 Result set_position(const wire::SetPosition& told) {
@@ -103,7 +100,7 @@ Result set_position(const wire::SetPosition& told) {
 
 Result begin_home(const wire::Home& told) {
     if (!home::is_good(told)) return Result::OUT_OF_RANGE;
-    if (!power::has_option(power::LIMIT_SWITCHES)) return Result::WRONG_STATE;
+    if (!settings::has_option(settings::LIMIT_SWITCHES)) return Result::WRONG_STATE;
     const Result result = try_event(Event::HOME);
     if (result == Result::OK) home::begin(told, power::ready_ticks() + wire::MIN_LEAD_TICKS);
     return result;

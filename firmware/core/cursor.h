@@ -32,7 +32,7 @@ class Cursor {
     void finish(uint32_t segment_ticks);
 
     // The clock stood still for `ticks`.
-    void shift(uint32_t ticks) { last_ticks_ += ticks; }
+    void shift(uint32_t ticks) { increase(last_ticks_, ticks); }
 
   private:
     // The next steps of a slice. Times are in 2^-16 ticks from the tick of the first of them: steps of one

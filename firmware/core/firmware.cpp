@@ -12,6 +12,7 @@
 #include "power.h"
 #include "reply.h"
 #include "session.h"
+#include "settings.h"
 #include "supervisor.h"
 
 namespace planarm {
@@ -50,11 +51,12 @@ void fail(wire::Fault fault, uint8_t detail = 0) {
 
 void serve_emergency() {
     if (supervisor::state() == wire::State::FAULT) return;
-    const bool open = power::has_option(power::STOP_INPUT) && (hal::inputs() & hal::STOP_INPUT_OPEN) != 0;
+    const bool open =
+        settings::has_option(settings::STOP_INPUT) && (hal::inputs() & hal::STOP_INPUT_OPEN) != 0;
     const hal::Emergency emergency = hal::emergency();
     if (emergency == hal::Emergency::NONE && !open) return;
     fail(emergency == hal::Emergency::LINE ? wire::Fault::EMERGENCY_STOP : wire::Fault::STOP_INPUT);
-    if (power::has_option(power::EMERGENCY_RELEASES)) power::release();
+    if (settings::has_option(settings::EMERGENCY_RELEASES)) power::release();
 }
 
 // A step was missed, or the interrupts were switched off by an emergency a moment ago.
@@ -122,6 +124,7 @@ void serve_hold() {
 
 void serve_rest() {
     if (supervisor::state() == wire::State::RUNNING && ++passes % PASSES_A_LOOK != 0) return;
+    power::serve();
     serve_homing();
     serve_limits();
     if (supervisor::state() == wire::State::READY && power::is_idle_too_long()) {
@@ -142,8 +145,9 @@ void receive() {
 }  // namespace
 
 void set_up(const Boot& boot, uint32_t now_ticks) {
-    receiver = FrameReceiver();
+    receiver.reset();
     clock::reset(now_ticks);
+    settings::reset();
     motion::reset();
     home::reset();
     power::reset();

@@ -2,6 +2,8 @@
 
 namespace planarm {
 
+void increase(uint32_t& value, uint32_t by) { value += by; }
+
 Fixed48 run_time(uint8_t n, uint32_t interval_q16, int32_t add_q16) {
     Fixed48 time = multiply(interval_q16, n);
     if (n < 2 || add_q16 == 0) return time;

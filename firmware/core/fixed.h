@@ -15,6 +15,9 @@ using hal::multiply_q32;
 using hal::multiply_saturated;
 using hal::subtract_from;
 
+// value += by, in place: a call takes a third of the bytes that the sum takes where it is made.
+void increase(uint32_t& value, uint32_t by);
+
 // 2^32 - 1 when the sum does not fit.
 inline uint32_t add_saturated(uint32_t a, uint32_t b) {
     const uint32_t sum = a + b;

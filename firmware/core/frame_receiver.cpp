@@ -5,6 +5,14 @@
 
 namespace planarm {
 
+void FrameReceiver::reset() {
+    count_ = 0;
+    end_ = PAYLOAD_AT;
+    crc_ = wire::CRC_INITIAL;
+    escaped_ = false;
+    damaged_ = false;
+}
+
 uint8_t FrameReceiver::receive(const uint8_t* bytes, uint8_t count, Event& event) {
     event = Event::NONE;
     uint8_t used = 0;
@@ -67,11 +75,7 @@ FrameReceiver::Event FrameReceiver::special(uint8_t byte) {
 FrameReceiver::Event FrameReceiver::finish() {
     const bool silence = count_ == 0 && !escaped_ && !damaged_;
     const bool good = count_ == end_ && crc_ == 0 && !escaped_ && !damaged_;
-    count_ = 0;
-    end_ = PAYLOAD_AT;
-    crc_ = wire::CRC_INITIAL;
-    escaped_ = false;
-    damaged_ = false;
+    reset();
     if (silence) return Event::NONE;
     return good ? Event::FRAME : Event::DAMAGED;
 }

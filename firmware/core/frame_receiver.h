@@ -27,6 +27,9 @@ class FrameReceiver {
   public:
     enum class Event : uint8_t { NONE, FRAME, DAMAGED };
 
+    // Before the first byte.
+    void reset();
+
     // Takes bytes of the line, at least one, as far as the first event; returns how many. DAMAGED is told
     // once for each delimiter that ends something other than a good frame. On the Uno about 40 cycles a byte.
     uint8_t receive(const uint8_t* bytes, uint8_t count, Event& event);
@@ -43,11 +46,11 @@ class FrameReceiver {
     Event finish();
 
     Frame frame_;
-    uint8_t count_ = 0;
-    uint8_t end_ = PAYLOAD_AT;  // bytes that the frame has when complete, as far as known
-    uint16_t crc_ = wire::CRC_INITIAL;
-    bool escaped_ = false;
-    bool damaged_ = false;
+    uint8_t count_;
+    uint8_t end_;  // bytes that the frame has when complete, as far as known
+    uint16_t crc_;
+    bool escaped_;
+    bool damaged_;
 };
 
 }  // namespace planarm

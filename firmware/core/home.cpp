@@ -1,6 +1,7 @@
 #include "home.h"
 
 #include "clock.h"
+#include "fixed.h"
 #include "hal_base.h"
 #include "inputs.h"
 #include "segment.h"
@@ -53,7 +54,7 @@ bool feed(Homing& at) {
     run.positive = (at.order.positive == 1) != (at.phase == Phase::BACK);
     step_engine::append(at.order.joint, !at.first_step && at.interval_ticks <= NEAR_TICKS);
     at.first_step = false;
-    at.next_ticks += at.interval_ticks;
+    increase(at.next_ticks, at.interval_ticks);
     --at.steps_left;
     return true;
 }

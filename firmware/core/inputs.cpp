@@ -2,7 +2,7 @@
 
 #include "clock.h"
 #include "hal_pins.h"
-#include "power.h"
+#include "settings.h"
 
 namespace planarm {
 namespace inputs {
@@ -16,7 +16,8 @@ uint32_t changed_ticks;
 
 uint8_t read() {
     uint8_t bits = hal::inputs();
-    if (power::has_option(power::LIMITS_OPEN_WHEN_HIT)) bits ^= static_cast<uint8_t>(~hal::STOP_INPUT_OPEN);
+    if (settings::has_option(settings::LIMITS_OPEN_WHEN_HIT))
+        bits ^= static_cast<uint8_t>(~hal::STOP_INPUT_OPEN);
     return bits;
 }
 
@@ -47,7 +48,7 @@ void excuse_hit() { left = steady; }
 bool is_hit(uint8_t joint) { return is_set(steady, joint); }
 
 uint8_t hit_joint() {
-    if (!power::has_option(power::LIMIT_SWITCHES)) return wire::JOINTS;
+    if (!settings::has_option(settings::LIMIT_SWITCHES)) return wire::JOINTS;
     for (uint8_t joint = 0; joint < wire::JOINTS; ++joint) {
         if (is_set(static_cast<uint8_t>(steady & ~left), joint)) return joint;
     }

@@ -6,6 +6,7 @@
 #include "path_clock.h"
 #include "queue.h"
 #include "segment.h"
+#include "settings.h"
 #include "step_engine.h"
 
 namespace planarm {
@@ -13,8 +14,6 @@ namespace motion {
 
 using path_clock::ONE;
 using path_clock::Slice;
-
-Joint joints[wire::JOINTS];
 
 namespace {
 
@@ -101,6 +100,7 @@ class Motion {
     Progress freeze_if_due();
 
     bool running;
+    bool begun;  // the first slice
     bool frozen;
     bool starved;  // frozen because the queue ran low
     uint32_t frozen_ticks;
@@ -142,7 +142,7 @@ bool Motion::is_starving(uint32_t path_ticks, uint32_t margin_ticks) const {
 [[gnu::noinline]] void Motion::read_next_segment() {
     if (!reading) {
         if (queue::is_empty()) return;
-        payload = queue::front();
+        queue::read_front(payload);
         slow_value = path_clock::rate_value(payload.u8());
         fast_value = path_clock::rate_value(payload.u8());
         need_ticks = static_cast<uint32_t>(payload.u8()) * wire::NEED_UNIT_TICKS;
@@ -174,7 +174,7 @@ bool Motion::is_starving(uint32_t path_ticks, uint32_t margin_ticks) const {
 
 bool is_calm() {
     for (uint8_t joint = 0; joint < wire::JOINTS; ++joint) {
-        if (!cursors[joint].is_calm(slice, joints[joint].start_stop_ticks)) return false;
+        if (!cursors[joint].is_calm(slice, settings::config.start_stop_ticks[joint])) return false;
     }
     return true;
 }
@@ -251,7 +251,7 @@ void Motion::clear() {
     queue::clear();
     queued_path_ticks = 0;
     queue_end.complete = false;
-    running = reading = in_segment = segment_last = filling = frozen = starved = false;
+    running = begun = reading = in_segment = segment_last = filling = frozen = starved = false;
     wish = Wish::GO;
     slice.begin_with(override_stretch);
     prepared_count = 0;
@@ -265,16 +265,16 @@ void Motion::clear() {
 void Motion::thaw() {
     const uint32_t stood_ticks = clock::pass_ticks() + THAW_LEAD_TICKS - frozen_ticks;
     step_engine::shift(stood_ticks);
-    for (uint8_t i = 0; i < prepared_count; ++i) prepared[i].end_ticks += stood_ticks;
+    for (uint8_t i = 0; i < prepared_count; ++i) increase(prepared[i].end_ticks, stood_ticks);
     for (Cursor& cursor : cursors) cursor.shift(stood_ticks);
-    if (static_cast<int32_t>(begin_ticks - frozen_ticks) > 0) begin_ticks += stood_ticks;
+    if (!begun) increase(begin_ticks, stood_ticks);
     slice.shift(stood_ticks);
     frozen = starved = false;
 }
 
 // True when the slice that is being executed lets the joints stop dead, or none is yet.
 bool Motion::may_freeze() const {
-    if (!clock::has_come(begin_ticks)) return true;
+    if (!begun) return true;
     return prepared_count != 0 && prepared[0].calm;
 }
 
@@ -301,7 +301,6 @@ bool Motion::may_freeze() const {
 
 void Motion::reset() {
     step_engine::reset();
-    for (Joint& joint : joints) joint = {wire::DEFAULT_START_STOP_TICKS, 0, -1};
     set_override(100);
     executed_segments = 0;
     clear();
@@ -327,6 +326,7 @@ uint8_t Motion::rate_percent() const {
 
 Progress Motion::serve() {
     if (!running) return Progress::GOING;
+    begun = begun || clock::has_come(begin_ticks);
     if (frozen) return serve_frozen();
     if (!step_engine::serve()) return Progress::MISSED;
     prepare();
@@ -385,11 +385,21 @@ void halt() { current().halt(); }
 
 uint32_t tell_ledger(wire::Ledger& ledger) { return current().tell_ledger(ledger); }
 
+namespace {
+
+bool is_out_of_limits(uint8_t joint, int32_t usteps) {
+    const int32_t least_usteps = settings::soft_limits.least_usteps[joint];
+    const int32_t most_usteps = settings::soft_limits.most_usteps[joint];
+    return least_usteps <= most_usteps && (usteps < least_usteps || usteps > most_usteps);
+}
+
+}  // namespace
+
 wire::Result begin_check(const uint8_t* bytes, uint8_t length) {
     if (queue_end.complete) return wire::Result::WRONG_STATE;
     if (length > queue::free_bytes()) return wire::Result::BUSY;
     Check& at = hal::by_base(checked);
-    at.reader = Reader(bytes, length);
+    at.reader.begin(bytes, length);
     for (uint8_t i = 0; i < 3; ++i) at.reader.u8();
     at.path_ticks = 0;
     at.end = queue_end;
@@ -403,15 +413,12 @@ wire::Result check_next() {
     SegmentHead head;
     read_head(at.reader, head);
     bool good = head.duration_ticks != 0 && head.duration_ticks <= wire::MAX_SEGMENT_TICKS;
-    JointEnd* end = at.end.joints;
-    for (const Joint& joint : joints) {
+    for (uint8_t joint = 0; joint < wire::JOINTS; ++joint) {
         Move move;
         read_move(at.reader, move);
-        good = good && check_move(move, head.duration_ticks, *end);
-        const bool out = end->usteps < joint.least_usteps || end->usteps > joint.most_usteps;
-        const bool limited = joint.least_usteps <= joint.most_usteps;
-        if (limited && out && move.steps != 0) at.joint_out = static_cast<uint8_t>(end - at.end.joints);
-        ++end;
+        JointEnd& end = at.end.joints[joint];
+        good = good && check_move(move, head.duration_ticks, end);
+        if (move.steps != 0 && is_out_of_limits(joint, end.usteps)) at.joint_out = joint;
     }
     if (!at.reader.ok()) return wire::Result::MALFORMED;
     if (!good) return wire::Result::OUT_OF_RANGE;

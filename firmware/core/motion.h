@@ -28,15 +28,6 @@ enum class Progress : uint8_t {
 // What the path clock is to do.
 enum class Wish : uint8_t { GO, REST, REST_QUICKLY };
 
-// What CONFIG and SOFT_LIMITS tell.
-struct Joint {
-    uint32_t start_stop_ticks;
-    int32_t least_usteps;
-    int32_t most_usteps;
-};
-
-extern Joint joints[wire::JOINTS];
-
 // Empty queue, ledger 0, defaults. For start-up, before interrupts are on.
 void reset();
 

@@ -1,7 +1,5 @@
 #include "path_clock.h"
 
-#include "fixed.h"
-
 namespace planarm {
 namespace path_clock {
 
@@ -62,13 +60,14 @@ uint32_t stretch_after(uint32_t stretch, const Way& way) {
 
 void Slice::follow(const Way& way) {
     from_path_ = static_cast<uint16_t>(end_path_);
-    end_path_ += way.path_ticks;
+    increase(end_path_, way.path_ticks);
     start_ticks_ = end_ticks_;
     ends_segment_ = way.ends_segment;
     s0_ = s1_;
     if (s1_ != way.target) s1_ = stretch_after(s1_, way);
     plain_ = s0_ == ONE && s1_ == ONE;
-    end_ticks_ += plain_ ? way.path_ticks : multiply((s0_ + s1_) >> 1, way.path_ticks).high;
+    const uint32_t ticks = plain_ ? way.path_ticks : multiply((s0_ + s1_) >> 1, way.path_ticks).high;
+    increase(end_ticks_, ticks);
     if (s0_ != s1_) reciprocal_ = 0xFFFFFFFF / way.path_ticks;
 }
 

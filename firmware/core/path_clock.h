@@ -9,6 +9,7 @@
 
 #include <stdint.h>
 
+#include "fixed.h"
 #include "messages.h"
 
 namespace planarm {
@@ -58,8 +59,8 @@ class Slice {
 
     // The clock stood still.
     void shift(uint32_t ticks) {
-        start_ticks_ += ticks;
-        end_ticks_ += ticks;
+        increase(start_ticks_, ticks);
+        increase(end_ticks_, ticks);
     }
 
   private:

@@ -1,9 +1,11 @@
 #include "power.h"
 
 #include "clock.h"
+#include "fixed.h"
 #include "hal_base.h"
 #include "hal_journal.h"
 #include "hal_pins.h"
+#include "settings.h"
 
 namespace planarm {
 namespace power {
@@ -15,7 +17,6 @@ constexpr uint32_t TICKS_A_MS = wire::TICKS_HZ / 1000;
 constexpr uint32_t MARK_TICKS = 20 * TICKS_A_MS;
 
 struct Power {
-    Config config;
     bool energised;
     bool waking;
     uint32_t awake_ticks;
@@ -30,24 +31,20 @@ Power power;
 void reset() {
     Power& at = hal::by_base(power);
     at = Power();
-    at.config.wake_ticks = wire::DEFAULT_WAKE_TICKS;
     at.counted_ticks = clock::pass_ticks();
 }
 
-void configure(const Config& told) {
-    power.config = told;
-    hal::set_enable_active_high(has_option(ENABLE_ACTIVE_HIGH));
+void configure() {
+    hal::set_enable_active_high(settings::has_option(settings::ENABLE_ACTIVE_HIGH));
     hal::drivers_enable(false);
 }
-
-bool has_option(Option option) { return (power.config.options & option) != 0; }
 
 void energise() {
     hal::journal_mark(true);
     hal::drivers_enable(true);
     Power& at = hal::by_base(power);
     at.energised = at.waking = true;
-    const uint32_t wake_ticks = at.config.wake_ticks;
+    const uint32_t wake_ticks = settings::config.wake_ticks;
     at.awake_ticks = clock::pass_ticks() + (wake_ticks > MARK_TICKS ? wake_ticks : MARK_TICKS);
 }
 
@@ -57,9 +54,13 @@ void release() {
     power.energised = power.waking = false;
 }
 
+void serve() {
+    if (clock::has_come(power.awake_ticks)) power.waking = false;
+}
+
 uint32_t ready_ticks() {
-    Power& at = hal::by_base(power);
-    if (clock::has_come(at.awake_ticks)) at.waking = false;
+    serve();
+    const Power& at = hal::by_base(power);
     return at.waking ? at.awake_ticks : clock::pass_ticks();
 }
 
@@ -70,13 +71,13 @@ void note_activity() {
 }
 
 bool is_idle_too_long() {
-    ready_ticks();  // notices that they woke before the clock has gone round
     Power& at = hal::by_base(power);
     if (clock::has_come(at.counted_ticks + TICKS_A_MS)) {
-        at.counted_ticks += TICKS_A_MS;
+        increase(at.counted_ticks, TICKS_A_MS);
         ++at.idle_for_ms;
     }
-    return at.config.idle_ms != 0 && at.energised && at.idle_for_ms >= at.config.idle_ms;
+    const uint32_t idle_ms = settings::config.idle_ms;
+    return idle_ms != 0 && at.energised && at.idle_for_ms >= idle_ms;
 }
 
 }  // namespace power

@@ -1,5 +1,4 @@
-// The drivers' supply as far as ENABLE goes: wake-up time, release after idleness, the mark in EEPROM, and
-// what CONFIG tells of the wiring.
+// The drivers' supply as far as ENABLE goes: wake-up time, release after idleness, the mark in EEPROM.
 #pragma once
 
 #include <stdint.h>
@@ -9,29 +8,18 @@
 namespace planarm {
 namespace power {
 
-struct Config {
-    uint8_t options;
-    uint32_t idle_ms;
-    uint32_t wake_ticks;
-};
-
-enum Option : uint8_t {
-    ENABLE_ACTIVE_HIGH = 0x01,
-    EMERGENCY_RELEASES = 0x02,
-    STOP_INPUT = 0x04,
-    LIMIT_SWITCHES = 0x08,
-    LIMITS_OPEN_WHEN_HIT = 0x10,
-};
-
-// Drivers released, defaults. For start-up.
+// Drivers released. For start-up.
 void reset();
 
-void configure(const Config& config);
-bool has_option(Option option);
+// Takes over what the settings tell.
+void configure();
 
 // Energises the drivers, and marks in EEPROM that the arm is held.
 void energise();
 void release();
+
+// Notices that the drivers are awake. To be called often, so that it does so before the clock has gone round.
+void serve();
 
 // The earliest tick for a first step: the drivers are awake and the mark is written.
 uint32_t ready_ticks();

@@ -43,7 +43,7 @@ void append(const uint8_t* payload, uint8_t length) {
     used_bytes = static_cast<uint16_t>(used_bytes + length + wire::QUEUE_FRAME_BYTES);
 }
 
-Reader front() { return Reader(after(read_at, 1), *read_at, ring, RING_END); }
+void read_front(Reader& reader) { reader.begin(after(read_at, 1), *read_at, ring, RING_END); }
 
 void release() {
     const uint8_t length = *read_at;

@@ -21,7 +21,7 @@ uint16_t free_bytes();
 void append(const uint8_t* payload, uint8_t length);
 
 // Reads the oldest payload, from its first byte; what is read must be given back by `release`.
-Reader front();
+void read_front(Reader& reader);
 // Frees the oldest payload's bytes; its Reader is no longer good.
 void release();
 

@@ -7,11 +7,15 @@ namespace planarm {
 
 class Reader {
   public:
-    Reader() = default;
-    Reader(const uint8_t* bytes, uint8_t length) : at_(bytes), left_(length) {}
-    // Bytes that go on at `ring` after `ring_end`.
-    Reader(const uint8_t* bytes, uint8_t length, const uint8_t* ring, const uint8_t* ring_end)
-        : at_(bytes), left_(length), ring_(ring), ring_end_(ring_end) {}
+    // Begins with a payload, whose bytes go on at `ring` after `ring_end` when it lies in one.
+    void begin(const uint8_t* bytes, uint8_t length, const uint8_t* ring = nullptr,
+               const uint8_t* ring_end = nullptr) {
+        at_ = bytes;
+        left_ = length;
+        ring_ = ring;
+        ring_end_ = ring_end;
+        ok_ = true;
+    }
 
     bool at_end() const { return left_ == 0; }
     // False once a field was cut short or too large; every field read from then on is 0.
@@ -24,11 +28,11 @@ class Reader {
   private:
     uint32_t fail();
 
-    const uint8_t* at_ = nullptr;
-    uint8_t left_ = 0;
-    const uint8_t* ring_ = nullptr;
-    const uint8_t* ring_end_ = nullptr;
-    bool ok_ = true;
+    const uint8_t* at_;
+    uint8_t left_;
+    bool ok_;
+    const uint8_t* ring_;
+    const uint8_t* ring_end_;
 };
 
 }  // namespace planarm

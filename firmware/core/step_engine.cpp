@@ -1,6 +1,7 @@
 #include "step_engine.h"
 
 #include "clock.h"
+#include "fixed.h"
 #include "hal_signals.h"
 #include "joints.h"
 
@@ -263,7 +264,7 @@ bool freeze(uint32_t& now_ticks) {
 void shift(uint32_t ticks) {
     for (uint8_t joint = 0; joint < wire::JOINTS; ++joint) {
         for (Run* run = step_joints[joint].active; run != rings[joint].free; run = run->next) {
-            run->first_ticks += ticks;
+            increase(run->first_ticks, ticks);
         }
     }
 }

@@ -76,6 +76,8 @@ struct Joint {
 // What is seen from outside: the pins and the line back.
 class Witness {
   public:
+    Witness() { receiver_.reset(); }
+
     uint8_t expected_seq() const { return expected_seq_; }
 
     void look() {

@@ -10,6 +10,7 @@ from firmware_board import (
     LEAD_TICKS,
     WAKE_TICKS,
     Board,
+    Delays,
     EmulatedFirmware,
     Firmware,
     NativeFirmware,
@@ -23,6 +24,7 @@ from planarm_wire.messages import (
     EMERGENCY_CODE,
     EMERGENCY_REPEATS,
     ENABLE_PIN,
+    HOLD_CODE,
     JOINTS,
     STEP_PINS,
     Clear,
@@ -39,6 +41,7 @@ from planarm_wire.messages import (
     Start,
     State,
 )
+from planarm_wire.rates import rate_code
 
 BYTE_TICKS = 10 * 16_000_000 // BAUD
 MOST_TICKS_AFTER_STOP = 480  # 30 us
@@ -296,3 +299,48 @@ def test_homing_without_a_switch_fails_within_its_distance(firmware: Firmware) -
     status = board.ask()
     assert (status.state, status.fault, status.detail) == (State.FAULT, Fault.HOMING_FAILED, 0)
     assert status.ledger.position_usteps == (30, 0)
+
+
+HALF_ROUND_TICKS = 2**31  # of the 32-bit clock: what is older seems to lie ahead
+
+
+def start_long_motion(board: Board) -> int:
+    """160 s of joint 1 at a thousand steps/s, ten times its start-stop speed. Returns the tick of START."""
+    rate = rate_code(5.0)
+    for segment in end_motion([segment_of(64_000_000, run_of(4000, first=0, interval=16_000))] * 40):
+        board.send(Segments(rate, rate, 20, (segment,)))
+        board.run(60_000)
+    board.send(Start(LEAD_TICKS))
+    return board.now
+
+
+def test_a_hold_after_half_a_round_of_the_clock_slows_down(native_firmware: NativeFirmware) -> None:
+    board = Board(native_firmware, delays=Delays(pass_ticks=4000))
+    board.hello()
+    board.ask(WIRING)
+    board.ask(Enable(1))
+    board.run(WAKE_TICKS)
+    begin = start_long_motion(board)
+    board.run(begin + HALF_ROUND_TICKS + 16_000_000 - board.now)
+    board.edges.clear()
+    board.receive(bytes([HOLD_CODE]))
+    held = board.now
+    board.run(16_000_000)
+    assert board.ask().state is State.HELD
+    assert board.rises(0)[-1] - held > 1_600_000, "0.1 s of slowing down"
+
+
+def test_drivers_that_woke_long_ago_do_not_hold_up_the_next_start(native_firmware: NativeFirmware) -> None:
+    board = Board(native_firmware, delays=Delays(pass_ticks=4000))
+    board.hello()
+    board.ask(WIRING)
+    board.ask(Enable(1))
+    begin = start_long_motion(board)  # while they wake
+    board.run(begin + 161 * 16_000_000 - board.now)
+    assert board.ask().state is State.READY
+    board.edges.clear()
+    for segment in end_motion([segment_of(160_000, run_of(10, first=0, interval=16_000))]):
+        board.ask(Segments(0, 0, 0, (segment,)))
+    board.send(Start(LEAD_TICKS))
+    board.run(LEAD_TICKS + 400_000)
+    assert len(board.rises(0)) == 10

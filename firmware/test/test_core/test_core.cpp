@@ -162,7 +162,8 @@ CASE(reader_takes_numbers_in_their_shortest_form_only) {
         {{}, false, 0},
     };
     for (const auto& item : cases) {
-        Reader reader(item.bytes.data(), static_cast<uint8_t>(item.bytes.size()));
+        Reader reader;
+        reader.begin(item.bytes.data(), static_cast<uint8_t>(item.bytes.size()));
         CHECK(reader.varuint() == item.value);
         CHECK(reader.ok() == item.good);
     }
@@ -170,7 +171,8 @@ CASE(reader_takes_numbers_in_their_shortest_form_only) {
 
 CASE(reader_undoes_zigzag) {
     const Bytes bytes = {0x00, 0x01, 0x02, 0xFE, 0xFF, 0xFF, 0xFF, 0x0F, 0xFF, 0xFF, 0xFF, 0xFF, 0x0F};
-    Reader reader(bytes.data(), static_cast<uint8_t>(bytes.size()));
+    Reader reader;
+    reader.begin(bytes.data(), static_cast<uint8_t>(bytes.size()));
     const int32_t expected[] = {0, -1, 1, INT32_MAX, INT32_MIN};
     for (int32_t value : expected) CHECK(reader.varint() == value);
     CHECK(reader.ok() && reader.at_end());
@@ -178,6 +180,7 @@ CASE(reader_undoes_zigzag) {
 
 CASE(receiver_takes_every_frame_that_is_sound) {
     FrameReceiver receiver;
+    receiver.reset();
     for (int i = 0; i < 500; ++i) {
         const Bytes payload = random_bytes(wire::MAX_PAYLOAD_BYTES);
         const uint8_t seq = static_cast<uint8_t>(random_bits());
@@ -191,6 +194,7 @@ CASE(receiver_takes_every_frame_that_is_sound) {
 
 CASE(receiver_finds_every_single_damaged_bit) {
     FrameReceiver receiver;
+    receiver.reset();
     const Bytes line = encode(5, 4, {1, 2, 0x7E, 4, 0x7D, 6});
     for (size_t bit = 0; bit < 8 * (line.size() - 1); ++bit) {
         Bytes damaged = line;
@@ -207,11 +211,13 @@ CASE(receiver_takes_no_needless_escape) {
     line.insert(line.begin() + 2, wire::ESCAPE);
     line[3] ^= wire::ESCAPE_XOR;
     FrameReceiver receiver;
+    receiver.reset();
     CHECK(last_event(receiver, line) == FrameReceiver::Event::DAMAGED);
 }
 
 CASE(receiver_takes_no_payload_over_the_limit) {
     FrameReceiver receiver;
+    receiver.reset();
     const Bytes longest(wire::MAX_PAYLOAD_BYTES, 1);
     const Bytes too_long(wire::MAX_PAYLOAD_BYTES + 1, 1);
     CHECK(last_event(receiver, encode(5, 2, too_long)) == FrameReceiver::Event::DAMAGED);
