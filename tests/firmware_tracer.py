@@ -36,16 +36,14 @@ class Tracer(EmulatedFirmware):
         self.run_until(lambda: bool(self.chip.sreg & INTERRUPTS_ON))  # an interrupt, or a lock, would switch them on
         self.chip.sreg &= ~INTERRUPTS_ON
         self.uno.run(cycles=ticks)
-        for _ in range(40):  # past the end of a lock, which would switch off again what it found off
+        # On to the main program's next pass: the end of a lock that is open now would switch off what it found off.
+        while not self._begins_pass():
             self.chip.run_to(self.chip.cycle + 1)
-            if self._ends_lock():
-                break
         self.chip.sreg |= INTERRUPTS_ON
 
-    def _ends_lock(self) -> bool:
-        """True when the last instruction was OUT SREG."""
-        last = self.uno.flash[self.chip.pc - 2 : self.chip.pc]
-        return int.from_bytes(last, "little") & 0xFE0F == 0xBE0F
+    def _begins_pass(self) -> bool:
+        """True when the next instruction is WDR, with which a pass begins."""
+        return self.uno.flash[2 * self.chip.pc : 2 * self.chip.pc + 2] == b"\xa8\x95"
 
     def taken(self, vector: int) -> set[int]:
         return {cycles for number, cycles in self.done if number == vector}
