@@ -56,6 +56,21 @@ def waves(rng):
     return JointCurve(total(np.sin, 0), total(np.cos, 1), total(lambda x: -np.sin(x), 2), borders=(0.0, 2.0, 5.0))
 
 
+def joint_waves(rng, joints):
+    """The same for any number of joints, all of whose derivatives are told by the sines themselves."""
+    sizes, rates = rng.uniform(0.2, 0.8, (3, joints)), rng.uniform(1.0, 5.0, (3, joints))
+    phases = rng.uniform(0.0, 2.0 * pi, (3, joints))
+
+    def derivative(order):
+        def of(s):
+            angles = rates[:, :, None] * np.asarray(s) + phases[:, :, None] + order * pi / 2.0
+            return list((sizes[:, :, None] * rates[:, :, None] ** order * np.sin(angles)).sum(axis=0))
+
+        return of
+
+    return JointCurve(derivative(0), derivative(1), derivative(2))
+
+
 def tip_points(rng, count, least=16.0, greatest=48.0):
     """Way-points of the tip whose straight moves stay out of the inner hole of the 30 + 20 cm arm."""
     points = []

@@ -16,7 +16,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from planarm.analysis.step_count import Waveform, compare_steps, measure_steps
+from planarm.analysis.step_count import Waveform, compare_steps, measure_steps, start_tick_of
 from planarm.errors import (
     CertificateError,
     DeviceFault,
@@ -36,7 +36,7 @@ from planarm.model.arm import Arm
 from planarm.model.kinematics import forward
 from planarm.plan import Findings, Plan
 from planarm.plan_file import StoredPlan
-from planarm.record.arm_findings import SETTLE_S, ArmFindings, judge_arm, start_tick_of
+from planarm.record.arm_findings import SETTLE_S, ArmFindings, judge_arm
 from planarm.record.outcome import Outcome, Seen, StreamLog
 from planarm.routes.gentle import ROOM_CM, gentle_motion, jerk_limits
 from planarm.routes.moving_route import find_moving_route
@@ -122,7 +122,7 @@ def plan_scene(scene: Scene, notice: Notice, route: Route | None = None) -> Plan
         segments,
         certificate,
         plan_ms=1e3 * (time.perf_counter() - began_s),
-        timing=motion.timing,
+        timing=replace(motion.timing, executed_s=trajectory.duration_s),
         search_ms=1e3 * route.search_s,
         joint=route.joint,
         bound_cm=motion.bound_cm,
@@ -160,7 +160,7 @@ def motion_along(scene: Scene, route: Route, margin_cm: float, notice: Notice) -
         return Motion(trajectory, lambda limit: timed(scene, trajectory, limits, limit), timing, path, bound_cm)
     # Not timed anew: where a stop lacks road, the device slows down by itself.
     gentle = gentle_motion(scene, margin_cm - ROOM_CM, trajectory, limits, jerks)
-    timing = replace(timing, duration_s=gentle.duration_s)
+    timing = replace(timing, duration_s=gentle.duration_s, executed_s=gentle.duration_s)
     return Motion(gentle, lambda _limit: timed(scene, gentle, limits, None), timing, path, bound_cm)
 
 

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from planarm.analysis.step_count import MeasuredSteps, Waveform, compare_steps, measure_steps
+from planarm.analysis.step_count import MeasuredSteps, Waveform, compare_steps, measure_steps, start_tick_of
 
 HIGH_TICKS = 48
 
@@ -102,6 +102,15 @@ def test_a_motionless_plan_agrees_with_silent_pins():
     found = compare_steps([empty], [silent])
     assert found.agrees
     assert found.max_timing_error_ticks == 0
+
+
+def test_the_start_is_told_by_the_middle_of_the_first_steps():
+    exact = np.arange(1000, 101_000, 1000, dtype=np.int64)
+    early = np.array([900, 50_000], np.int64)  # by an interrupt that makes it 90 ticks early
+    slowed = np.where(exact > 80_000, 4_000, 0)  # and the device slows the motion down towards its end
+    assert start_tick_of([exact, early], [exact + 7_000 + slowed, early + 7_000 - 90]) == 7_000
+    assert start_tick_of([exact, early], [exact[:3] + 7_000, early[:0]]) == 7_000, "it broke off"
+    assert start_tick_of([early[:0]], [early[:0]]) == 0
 
 
 @pytest.mark.parametrize("extra_ticks", [1, 500])

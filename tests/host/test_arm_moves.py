@@ -6,16 +6,19 @@ from dataclasses import asdict
 import numpy as np
 import pytest
 
+from board_scenes import scene_of
 from broken_runs import SCENE, board
 from link_model import motion
 from planarm.cli.main import main
 from planarm.errors import LinkError, NoPathError, UsageError
 from planarm.link.exchange import open_session, request
 from planarm.link.positions import Positions
+from planarm.link.released_image import released_image
+from planarm.link.sim_transport import SimTransport
 from planarm.operations.arm_moves import goto, jog
 from planarm.plan_file import arm_hash
 from planarm.scene import load_scene
-from planarm.streaming.standing import look, pose_of, require_standing, tell, usteps_at
+from planarm.streaming.standing import look, pose_of, require_standing, start_usteps, tell, usteps_at
 from planarm_wire.messages import Enable, Segments
 
 PORT = "/dev/ttyUNO"
@@ -139,3 +142,57 @@ def test_stop_and_doctor_on_the_emulator(capsys):
         told = json.loads(capsys.readouterr().out)
         assert left.value.code == 0
         assert told.get("state", told.get("board", {}).get("state")) in ("idle", "ready")
+
+
+@pytest.mark.parametrize(("joints", "wiring"), [(3, "own"), (4, "own"), (2, "cnc_shield"), (3, "cnc_shield")])
+def test_an_arm_of_any_board_is_told_its_place_jogged_and_sent_to_a_pose(joints, wiring, positions):
+    scene = scene_of(joints, wiring)
+    line, start = SimTransport(released_image(scene.board.name), board=scene.board), start_usteps(scene)
+    tell(line, PORT, scene, positions, start, "zeroed")
+    standing = look(line, PORT, scene, positions)
+    assert standing.usteps == start
+    assert pose_of(scene, start)[0] == pytest.approx(np.array(scene.task.start_rad), abs=1e-3)
+    plan, done = jog(line, scene, standing, joints - 1, np.radians(5.0), nothing)
+    assert [len(plan.start_usteps), len(done.ledger_after.position_usteps)] == [joints, scene.board.joints]
+    standing = look(line, PORT, scene, positions)
+    assert standing.usteps[:-1] == start[:-1]
+    assert (standing.usteps[-1] - start[-1]) / scene.joints[-1].usteps_per_rad == pytest.approx(
+        np.radians(5.0), abs=1e-3
+    )
+    pose = np.array(scene.task.start_rad) + 0.1
+    goto(line, scene, standing, None, nothing, pose)
+    reached = pose_of(scene, look(line, PORT, scene, positions).usteps)[0]
+    assert reached == pytest.approx(pose, abs=1e-3)
+    made = sum(rises(line, pin) for pin in scene.board.step_pins)
+    assert made == rises_of(joints, line, scene)
+
+
+def rises_of(joints, line, scene):
+    """Steps at the pins of the arm's own joints: those beyond them rest."""
+    return sum(rises(line, pin) for pin in scene.board.step_pins[:joints])
+
+
+def test_places_that_an_arm_cannot_be_told_by_are_refused(positions):
+    three = scene_of(3)
+    with pytest.raises(UsageError, match=r"3 links has not one pose at a point; give joint angles \(--deg\)"):
+        usteps_at(three, (20.0, 20.0))
+    line = SimTransport(released_image("uno_four"), board=three.board)
+    tell(line, PORT, three, positions, start_usteps(three), "zeroed")
+    with pytest.raises(UsageError, match="3 links has not one pose at a point; give --deg"):
+        goto(line, three, look(line, PORT, three, positions), (20.0, 20.0), nothing)
+
+
+def test_a_board_with_other_joints_is_told_of_before_anything(positions):
+    two = SimTransport(released_image("uno"))
+    with pytest.raises(LinkError, match=r"steps 2 joints, the plan is for the board uno_four with 4: flash"):
+        look(two, PORT, scene_of(3), positions)
+
+
+def test_a_scene_on_sim_is_asked_on_its_own_board(tmp_path, capsys, monkeypatch):
+    monkeypatch.setenv("PLANARM_STATE", str(tmp_path))
+    examples = SCENE.parents[2] / "examples"
+    for name, zeros in (("three_links", [0] * 3), ("cnc_shield", [0] * 2)):
+        with pytest.raises(SystemExit) as end:
+            main(["status", str(examples / f"{name}.toml"), "--port", "sim://", "--json"])
+        assert not end.value.code
+        assert json.loads(capsys.readouterr().out)["usteps"] == zeros

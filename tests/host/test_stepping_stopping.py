@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from host_scenes import make_scene
-from motion_paths import joint, joint_line, tip_path, tip_points, waves
+from motion_paths import joint, joint_line, joint_waves, tip_path, tip_points, waves
+from planarm.scene import MechanicsSpec
 from planarm.stepping.check_motion import Planned
 from planarm.stepping.check_stop import check_stop
 from planarm.stepping.schedule import schedule
@@ -15,6 +16,7 @@ from planarm.stepping.stopping import LARGEST_RATE_PER_S, allowances, least_of_n
 from planarm.stepping.table import table_of
 from planarm.trajectory.timing import time_path
 from planarm_wire.messages import SLICE_TICKS
+from planarm_wire.wirings import board_of
 
 SLICE = SLICE_TICKS
 ONE = joint(speed=2.0, acceleration=10.0)
@@ -100,6 +102,29 @@ def test_a_motion_is_slowed_down_until_every_stop_fits():
     assert [check.name for check in checks if check.verdict == "red"] == []
     fit = next(check for check in checks if check.name == "road left after a stop")
     assert 0.0 <= fit.value < 0.1
+
+
+@pytest.mark.parametrize(("joints", "wiring"), [(3, "own"), (4, "own"), (2, "cnc_shield"), (4, "cnc_shield")])
+def test_a_small_queue_gets_slower_motions_with_all_stops_in_it(joints, wiring):
+    rng = np.random.default_rng(joints)
+    one = joint(speed=1.5, acceleration=8.0, usteps_per_rev=8_000)
+    scene = replace(make_scene(), joints=(one,) * joints, coupling=tuple(map(tuple, np.eye(joints))), wiring=wiring)
+    scene = replace(scene, arm=replace(scene.arm, link_lengths_cm=(10.0,) * joints))
+    scene = replace(scene, mechanics=MechanicsSpec.usual(scene.arm.link_lengths_cm))
+    path = joint_waves(rng, joints)
+    fastest = time_path(path, scene.joints)
+    trajectory, _, plan = schedule(scene, lambda limit: time_path(path, scene.joints, speed_cap=limit))
+    table = table_of(plan)
+    assert table.board == board_of(joints, wiring)
+    assert {len(segment.moves) for segment in plan.segments} == {table.board.joints}
+    assert shortfall_ticks(plan, table).max() <= 0.0
+    assert fastest.duration_s <= trajectory.duration_s < 3.5 * fastest.duration_s
+    fit = next(
+        check
+        for check in check_stop(plan, table, Planned.of(trajectory), scene)
+        if check.name == "road left after a stop"
+    )
+    assert fit.verdict == "green"
 
 
 def test_a_motion_whose_stops_fit_is_left_alone():

@@ -7,61 +7,19 @@ import numpy as np
 import pytest
 import shapely
 
+from board_scenes import GOAL, LENGTHS, scene_of
 from planarm.errors import LinkError, TimingError
 from planarm.link.exchange import open_session
 from planarm.link.released_image import released_image
 from planarm.link.sim_transport import SimTransport
 from planarm.pipeline import plan_scene, run_scene
 from planarm.plan_file import load_plan
-from planarm.scene import parse_scene
 from planarm_wire.messages import BOARDS, TICKS_HZ
 from planarm_wire.steps import duration_ticks
 
-ARM = """
-[arm]
-link_lengths_cm = {lengths}
-link_width_cm = 1.5
-elbow = "either"
-[board]
-wiring = "{wiring}"
-[workspace]
-x_cm = [-60, 60]
-y_cm = [-30, 60]
-[[obstacles]]
-shape = "polygon"
-vertices_cm = [[26, 22], [34, 24], [30, 34]]
-[task]
-start_deg = {start}
-goal_deg = {goal}
-[planner]
-algorithm = "mpd_star_lite"
-[roadmap]
-nodes = 500
-cost = "travel"
-[mechanics]
-gravity = false
-"""
-JOINT = """
-[[joints]]
-gear_ratio = 5
-microsteps = 8
-max_speed_deg_s = 60
-max_acceleration_deg_s2 = 600
-[joints.motor]
-current_a = 1.7
-"""
-LENGTHS, START, GOAL = (22.0, 16.0, 11.0, 7.0), (0.0, 40.0, -30.0, 20.0), (75.0, 10.0, 25.0, -30.0)
 CASES = [(joints, wiring) for wiring in ("own", "cnc_shield") for joints in (1, 2, 3, 4)]
 MOST_OFF_TICKS = {"uno": 0, "uno_four": 192, "cnc_shield": 160, "cnc_shield_four": 480}
 """docs/wiring.md's table: how far a step may rise from its tick."""
-
-
-def scene_of(joints, wiring="own", **joint):
-    head = ARM.format(
-        lengths=list(LENGTHS[:joints]), wiring=wiring, start=list(START[:joints]), goal=list(GOAL[:joints])
-    )
-    scene = parse_scene(head + JOINT * joints, f"{joints}-{wiring}.toml")
-    return replace(scene, joints=tuple(replace(one, **joint) for one in scene.joints))
 
 
 def no_notice(_stage, _share):
@@ -110,8 +68,8 @@ def test_a_scene_runs_on_its_board(joints, wiring, tmp_path):
     assert summary["net_usteps"] == summary["net_usteps_by_ledger"]
     assert summary["arm_lost_full_steps"] == [0] * joints
     assert summary["arm_end_tip_error_mm"] < 1.0
-    if joints <= 2:  # a queue of four joints holds little road: such a motion may be slowed down
-        assert summary["max_step_timing_error_ticks"] <= MOST_OFF_TICKS[board.name]
+    assert summary["max_step_timing_error_ticks"] <= MOST_OFF_TICKS[board.name]
+    assert summary.get("path_clock_percent", 100) == 100
 
 
 @pytest.mark.parametrize(("joints", "wiring"), CASES)

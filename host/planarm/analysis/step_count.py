@@ -16,6 +16,10 @@ Ticks = npt.NDArray[np.int64]
 Directions = npt.NDArray[np.int8]
 
 
+FIRST_STEPS = 64
+"""Steps of all joints together that tell where the plan's zero is."""
+
+
 @dataclass(frozen=True, slots=True)
 class Waveform:
     """One pin's edges.
@@ -113,7 +117,7 @@ def compare_steps(planned: Sequence[tuple[Ticks, Directions]], measured: Sequenc
 
     Returns:
         The comparison. The schedule's start on the board is not known to the host, so one offset, common to all
-        joints, is taken from the first step of all; every other edge has to fit it.
+        joints, is taken from the first steps; every other edge has to fit it.
     """
     counts_planned = tuple(len(ticks) for ticks, _ in planned)
     counts_measured = tuple(len(joint.ticks) for joint in measured)
@@ -122,12 +126,23 @@ def compare_steps(planned: Sequence[tuple[Ticks, Directions]], measured: Sequenc
     agree = all(
         np.array_equal(directions, joint.directions) for (_, directions), joint in zip(planned, measured, strict=True)
     )
-    moving = [(ticks, joint.ticks) for (ticks, _), joint in zip(planned, measured, strict=True) if len(ticks)]
-    if not moving:
-        return StepComparison(counts_planned, counts_measured, agree, 0)
-    offset = min(int(seen[0]) for _, seen in moving) - min(int(ticks[0]) for ticks, _ in moving)
-    error = max(int(np.abs(seen - ticks - offset).max()) for ticks, seen in moving)
+    offset = start_tick_of([ticks for ticks, _ in planned], [joint.ticks for joint in measured])
+    errors = [seen.ticks - ticks - offset for (ticks, _), seen in zip(planned, measured, strict=True)]
+    error = max((int(np.abs(one).max(initial=0)) for one in errors), default=0)
     return StepComparison(counts_planned, counts_measured, agree, error)
+
+
+def start_tick_of(planned: Sequence[Ticks], seen: Sequence[Ticks]) -> int:
+    """Return the tick of the plan's zero by the first steps at the pins, 0 when there is none.
+
+    A step that an interrupt makes comes a little early or late, one of a compare output does not, and a motion may be
+    slowed down later on: so it is the middle one of the first FIRST_STEPS steps' differences that counts.
+    """
+    pairs = [(ticks[: len(at)], at[: len(ticks)]) for ticks, at in zip(planned, seen, strict=True)]
+    meant = np.concatenate([ticks for ticks, _ in pairs])
+    apart = np.concatenate([at for _, at in pairs]) - meant
+    first = np.sort(apart[np.argsort(meant, kind="stable")[:FIRST_STEPS]])
+    return int(first[(len(first) - 1) // 2]) if len(first) else 0
 
 
 def _least_gap(first: Ticks, then: Ticks) -> int | None:

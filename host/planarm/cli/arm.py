@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import argparse
 import json
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import closing, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
+
+from planarm.errors import UsageError
 
 if TYPE_CHECKING:
     from planarm.link.positions import Positions
@@ -37,8 +40,19 @@ def reached(options: argparse.Namespace) -> Iterator[Reached]:
 
     scene = load_scene(Path(options.scene))
     port = scene.link.port if options.port is None else options.port
-    with closing(open_transport(port, scene.link.baud)) as transport:
+    with closing(open_transport(port, scene.link.baud, board=scene.board)) as transport:
         yield Reached(scene, port, transport, Positions(default_path()))
+
+
+def pose_rad(scene: Scene, angles_deg: Sequence[float]) -> NDArray[np.float64]:
+    """Return joint angles as they are given to --deg.
+
+    Raises:
+        UsageError: they are not one a joint.
+    """
+    if len(angles_deg) != len(scene.joints):
+        raise UsageError(f"--deg: {len(angles_deg)} angles given, one a joint expected, {len(scene.joints)}")
+    return np.radians(np.array(angles_deg, np.float64))
 
 
 def tell_standing(as_json: bool, scene: Scene, usteps: tuple[int, ...], how: str | None, **more: Any) -> None:  # noqa: ANN401 - figures

@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import argparse
 
-from planarm.cli.arm import reached, tell_standing
+from planarm.cli.arm import pose_rad, reached, tell_standing
 from planarm.cli.progress import progress
 from planarm.cli.scenes import tell_first_compile
+from planarm.errors import UsageError
 
 
 def execute(options: argparse.Namespace) -> int:
     """Plan, go, and tell where the arm stands then."""
+    if (options.y_cm is None) == (not options.deg):
+        raise UsageError("give the point X Y in cm, or joint angles: --deg ANGLE ...")
     tell_first_compile("planarm", "planarm_sim")
     from planarm.link.position import moved_usteps
     from planarm.operations.arm_moves import goto
@@ -19,9 +22,10 @@ def execute(options: argparse.Namespace) -> int:
 
     with progress(options.json) as notice, reached(options) as arm:
         standing = look(arm.transport, arm.port, arm.scene, arm.positions)
-        target_cm = (options.x_cm, options.y_cm)
-        _, done = goto(arm.transport, arm.scene, standing, target_cm, telling(notice, notice.watch))
-    moved = moved_usteps(done.ledger_before, done.ledger_after)
-    usteps = tuple(at + by for at, by in zip(standing.usteps, moved, strict=False))
+        pose = pose_rad(arm.scene, options.deg) if options.deg else None
+        target_cm = None if options.deg else (options.x_cm, options.y_cm)
+        _, done = goto(arm.transport, arm.scene, standing, target_cm, telling(notice, notice.watch), pose)
+    moved = moved_usteps(done.ledger_before, done.ledger_after)[: len(standing.usteps)]
+    usteps = tuple(at + by for at, by in zip(standing.usteps, moved, strict=True))
     tell_standing(options.json, arm.scene, usteps, standing.how, moved_usteps=list(moved))
     return 0

@@ -25,7 +25,7 @@ def execute(options: argparse.Namespace) -> int:
         standing = look(arm.transport, arm.port, arm.scene, arm.positions)
         turn_rad = radians(options.degrees)
         _, done = jog(arm.transport, arm.scene, standing, options.joint - 1, turn_rad, telling(notice, notice.watch))
-    moved = moved_usteps(done.ledger_before, done.ledger_after)
-    usteps = tuple(at + by for at, by in zip(standing.usteps, moved, strict=False))
+    moved = moved_usteps(done.ledger_before, done.ledger_after)[: len(standing.usteps)]
+    usteps = tuple(at + by for at, by in zip(standing.usteps, moved, strict=True))
     tell_standing(options.json, arm.scene, usteps, standing.how, moved_usteps=list(moved))
     return 0

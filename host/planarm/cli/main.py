@@ -224,6 +224,10 @@ def _add_arm(commands: Commands) -> None:
     parsers["zero"].add_argument(
         "--at", nargs=2, type=float, metavar=("X", "Y"), help="the tip's place in cm (default: the task's start)"
     )
+    for name in ("zero", "goto"):
+        parsers[name].add_argument(
+            "--deg", nargs="+", type=float, metavar="ANGLE", help="a place by joint angles, for any number of links"
+        )
     parsers["home"].add_argument(
         "--prove",
         action="store_true",
@@ -231,8 +235,8 @@ def _add_arm(commands: Commands) -> None:
     )
     parsers["jog"].add_argument("joint", type=_count, metavar="JOINT", help="from 1")
     parsers["jog"].add_argument("degrees", type=float, metavar="DEGREES", help="counter-clockwise above 0")
-    parsers["goto"].add_argument("x_cm", type=float, metavar="X", help="in cm")
-    parsers["goto"].add_argument("y_cm", type=float, metavar="Y", help="in cm")
+    parsers["goto"].add_argument("x_cm", type=float, nargs="?", metavar="X", help="in cm")
+    parsers["goto"].add_argument("y_cm", type=float, nargs="?", metavar="Y", help="in cm")
     for command in parsers.values():
         _add_port(command)
         _add_json(command)

@@ -29,7 +29,7 @@ def execute(options: argparse.Namespace) -> int:
 
     run = load_run(Path(options.run))
     port = options.port or run.port
-    with closing(open_transport(port, run.scene.link.baud)) as transport:
+    with closing(open_transport(port, run.scene.link.baud, board=run.scene.board)) as transport:
         if options.check:
             _, report, _ = meet_again(run, transport)
             _tell(options.json, report, None)

@@ -34,14 +34,17 @@ def execute(options: argparse.Namespace) -> int:
     port = scene.link.port if options.port is None else options.port
     out = Path(options.out) if options.out else Path("out") / Path(options.plan).stem
     begin_run_folder(out, plan)
-    with progress(options.json) as notice, closing(open_transport(port, scene.link.baud)) as transport:
+    with (
+        progress(options.json) as notice,
+        closing(open_transport(port, scene.link.baud, board=scene.board)) as transport,
+    ):
         positions = Positions(default_path())
         line = record(transport, out, port, scene)
         settle_start(line, port, scene, plan.segments.start_usteps, positions, vouched=options.at_start)
         warn_of_release(scene, plan.segments, notice.warn)
         watch, how = telling(notice, notice.watch), options_for(scene, plan.segments)
         result = stream(plan.segments, plan.certificate, line, watch, how, warn=notice.warn)
-    moved = moved_usteps(result.ledger_before, result.ledger_after)
+    moved = moved_usteps(result.ledger_before, result.ledger_after)[: len(scene.joints)]
     told = {"moved_usteps": list(moved), "retransmissions": result.retransmissions, "run": str(out)}
     print(json.dumps(told) if options.json else f"executed {told['moved_usteps']} micro-steps")
     return 0

@@ -7,6 +7,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Protocol
 
 from planarm.scene import Scene
+from planarm_wire.boards import Board
+from planarm_wire.messages import BOARDS
 
 if TYPE_CHECKING:
     import numpy as np
@@ -92,3 +94,8 @@ class ArmTrace(Protocol):
     def settle(self, seconds: float) -> None:
         """Let emulated time pass, so that the arm comes to rest."""
         ...
+
+
+def emulated_board(setup: ArmSetup | None) -> Board:
+    """Return the board that is emulated where nobody names one: that of the scene around it, or the usual one."""
+    return BOARDS["uno"] if setup is None else setup.scene.board

@@ -3,17 +3,20 @@
 from pathlib import Path
 
 from planarm.errors import LinkError
-from planarm.link.arm_record import ArmSetup
+from planarm.link.arm_record import ArmSetup, emulated_board
 from planarm.link.released_image import released_image
 from planarm.link.sim_transport import SimTransport
-from planarm_wire.messages import BAUD, BOARDS
+from planarm_wire.boards import Board
+from planarm_wire.messages import BAUD
 
 
 class FileTransport(SimTransport):
     """An emulated board, and a file with every byte that is sent to it; `planarm dump` reads it."""
 
-    def __init__(self, path: str | Path, baud: int = BAUD, setup: ArmSetup | None = None) -> None:
-        board = BOARDS["uno"] if setup is None else setup.scene.board
+    def __init__(
+        self, path: str | Path, baud: int = BAUD, setup: ArmSetup | None = None, board: Board | None = None
+    ) -> None:
+        board = board or emulated_board(setup)
         super().__init__(released_image(board.name), baud, setup, board=board)
         self._path = Path(path)
         try:

@@ -19,8 +19,9 @@ from typing import TYPE_CHECKING, Any, Literal, Protocol
 from urllib.parse import parse_qs, urlsplit
 
 from planarm.errors import LinkError
-from planarm.link.arm_record import ArmSetup, ArmTrace
+from planarm.link.arm_record import ArmSetup, ArmTrace, emulated_board
 from planarm.link.clock import Clock
+from planarm_wire.boards import Board
 from planarm_wire.messages import BAUD, BOARDS
 
 if TYPE_CHECKING:
@@ -86,43 +87,44 @@ class Transport(Protocol):
         ...
 
 
-def open_transport(url: str, baud: int = BAUD, setup: ArmSetup | None = None) -> Transport:
+def open_transport(url: str, baud: int = BAUD, setup: ArmSetup | None = None, board: Board | None = None) -> Transport:
     """Open the line that `url` names.
 
     Args:
         url: see the module's text.
         baud: where that has a meaning.
         setup: what stands around an emulated board; others have what they have.
+        board: which one is emulated; None: the setup's, or uno. A real one is what it is.
 
     Raises:
         LinkError: it cannot be opened; the message tells why.
         EmulatorError: the setup cannot be built.
     """
     if url.startswith(SPY_PREFIX):
-        return _open_spied(url.removeprefix(SPY_PREFIX), baud, setup)
+        return _open_spied(url.removeprefix(SPY_PREFIX), baud, setup, board)
     scheme, separator, rest = url.partition("://")
     if not separator or scheme.lower() in PYSERIAL_SCHEMES:
         from planarm.link.serial_transport import SerialTransport  # noqa: PLC0415 - pyserial only where it is used
 
         return SerialTransport(url, baud)
     if scheme.lower() == SIM_SCHEME:
-        return _open_emulator(url, baud, setup)
+        return _open_emulator(url, baud, setup, board)
     if scheme.lower() == FILE_SCHEME:
         from planarm.link.file_transport import FileTransport  # noqa: PLC0415 - the emulator only where it is used
 
         if not rest:
             raise LinkError(f"port {url!r}: give a path, as in file://stream.bin")
-        return FileTransport(rest, baud, setup)
+        return FileTransport(rest, baud, setup, board)
     known = ", ".join(f"{name}://" for name in (SIM_SCHEME, FILE_SCHEME, *PYSERIAL_SCHEMES))
     raise LinkError(f"port {url!r}: unknown scheme {scheme!r}; give a device path or one of {known}")
 
 
-def _open_spied(url: str, baud: int, setup: ArmSetup | None) -> Transport:
+def _open_spied(url: str, baud: int, setup: ArmSetup | None, board: Board | None) -> Transport:
     from planarm.link.journal import JournalWriter  # noqa: PLC0415 - the journal only where one is kept
     from planarm.link.recording import RecordingTransport  # noqa: PLC0415
 
     inner, _, file = url.partition("#")
-    line = open_transport(inner, baud, setup)
+    line = open_transport(inner, baud, setup, board)
     path = Path(file or SPY_FILE)
     path.unlink(missing_ok=True)
     journal = JournalWriter(path)
@@ -130,7 +132,7 @@ def _open_spied(url: str, baud: int, setup: ArmSetup | None) -> Transport:
     return RecordingTransport(line, journal)
 
 
-def _open_emulator(url: str, baud: int, setup: ArmSetup | None) -> Transport:
+def _open_emulator(url: str, baud: int, setup: ArmSetup | None, board: Board | None) -> Transport:
     from planarm.link.released_image import released_image  # noqa: PLC0415
     from planarm.link.sim_transport import SimTransport  # noqa: PLC0415 - the emulator only where it is used
 
@@ -139,7 +141,8 @@ def _open_emulator(url: str, baud: int, setup: ArmSetup | None) -> Transport:
     kinds: dict[str, Literal["direct", "16u2"]] = {"direct": "direct", "16u2": "16u2"}
     usb = kinds.get(options.get("usb", ["direct"])[-1])
     isr = {"0": False, "1": True}.get(options.get("isr", ["0"])[-1])
-    named = options.get("board", ["uno" if setup is None else setup.scene.board.name])[-1]
+    board = board or emulated_board(setup)
+    named = options.get("board", [board.name])[-1]
     known = {"image", "board", "usb", "isr"}
     if parts.netloc or parts.path or set(options) - known or usb is None or isr is None or named not in BOARDS:
         raise LinkError(

@@ -6,15 +6,17 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
-from planarm.errors import LinkError, SceneError
+from planarm.errors import LinkError, SceneError, UsageError
 from planarm.link.exchange import StreamResult
 from planarm.link.stream import StreamProgress
 from planarm.link.transport import Transport
 from planarm.model.arm import Arm
+from planarm.model.kinematics import forward
 from planarm.model.transmission import Transmission
 from planarm.pipeline import plan_scene, planning_margin_cm, timed
-from planarm.scene import Scene
+from planarm.scene import Scene, TaskSpec
 from planarm.smoothing.joint_blend import blend_poses
 from planarm.stepping.certify import certify
 from planarm.stepping.plan import SegmentPlan
@@ -29,18 +31,23 @@ Progress = Callable[[StreamProgress], None]
 
 
 def goto(
-    transport: Transport, scene: Scene, standing: Standing, target_cm: tuple[float, float], on_progress: Progress
+    transport: Transport,
+    scene: Scene,
+    standing: Standing,
+    target_cm: tuple[float, float] | None,
+    on_progress: Progress,
+    pose_rad: NDArray[np.float64] | None = None,
 ) -> tuple[SegmentPlan, StreamResult]:
-    """Plan a certified path from where the arm stands to a point, and execute it.
+    """Plan a certified path from where the arm stands to a point, or to joint angles, and execute it.
 
     Raises:
         LinkError: the arm's place is not known.
+        UsageError: the scene's planner does not go from or to what is given.
         PlanarmError: as in planning and streaming.
     """
     if standing.how is None:
         raise LinkError("where the arm stands is not known: 'planarm home SCENE' or 'planarm zero SCENE' first")
-    here_cm = pose_of(scene, standing.usteps)[1]
-    there = replace(scene, task=replace(scene.task, start_cm=here_cm, goal_cm=target_cm))
+    there = replace(scene, task=_task(scene, standing, target_cm, pose_rad))
     plan = plan_scene(there, lambda _stage, _share: None)
     if plan.segments.start_usteps != standing.usteps:
         raise SceneError(
@@ -51,6 +58,24 @@ def goto(
         )
     result = stream(plan.segments, plan.certificate, transport, on_progress, options_for(there, plan.segments))
     return plan.segments, result
+
+
+def _task(
+    scene: Scene, standing: Standing, target_cm: tuple[float, float] | None, pose_rad: NDArray[np.float64] | None
+) -> TaskSpec:
+    """Return the task from where the arm stands; a planner on a roadmap starts at its very pose."""
+    here_rad, here_cm = pose_of(scene, standing.usteps)
+    if not scene.planner.on_roadmap:
+        if target_cm is None:
+            raise UsageError(f"{scene.planner.algorithm!r} goes to points: give X Y, or plan on a roadmap")
+        return TaskSpec(here_cm, target_cm)
+    start = tuple(map(float, here_rad))
+    if pose_rad is not None:
+        x_cm, y_cm = forward(Arm.from_spec(scene.arm), pose_rad)[-1]
+        return TaskSpec(here_cm, (float(x_cm), float(y_cm)), start, tuple(map(float, pose_rad)))
+    if target_cm is None or len(scene.joints) != 2:
+        raise UsageError(f"an arm with {len(scene.joints)} links has not one pose at a point; give --deg ANGLE ...")
+    return TaskSpec(here_cm, target_cm, start)
 
 
 def jog(

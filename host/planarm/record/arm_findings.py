@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -146,14 +145,6 @@ def moving_touches(record: ArmRecord, scene: Scene, zero_tick: int) -> list[Touc
         for number, ((pose, link), obstacle) in enumerate(zip(found, scene.obstacles, strict=True), start=1)
         if pose >= 0 and obstacle.motion is not None
     ]
-
-
-def start_tick_of(planned: Sequence[NDArray[np.int64]], seen: Sequence[NDArray[np.int64]]) -> int:
-    """Return the tick of the plan's zero: from the first step at the pins, 0 when there is none."""
-    moving = [(ticks, at) for ticks, at in zip(planned, seen, strict=True) if len(ticks) and len(at)]
-    if not moving:
-        return 0
-    return min(int(at[0]) for _, at in moving) - min(int(ticks[0]) for ticks, _ in moving)
 
 
 def _place(plan: Plan, at_s: float) -> str:

@@ -16,7 +16,7 @@ from planarm.stepping.certificate import Check, Verdict, at_least, at_most
 from planarm.stepping.check_motion import Planned
 from planarm.stepping.check_torque import STRIDE, at_motors_nm, joint_torques_nm, pull_outs_nm
 from planarm.stepping.plan import SegmentPlan
-from planarm.stepping.slowing import LINK_MARGIN_TICKS
+from planarm.stepping.slowing import link_margin_ticks
 from planarm.stepping.table import SegmentTable, segment_bytes
 from planarm.stepping.train import Floats, Ticks
 from planarm_wire.kernel_cache import kernel
@@ -78,10 +78,10 @@ def _check_fit(table: SegmentTable, needs_s: Floats) -> Check:
     at, owner = _slices(table)
     name, setting = "road left after a stop", "joints.max_speed_deg_s or joints.max_acceleration_deg_s2"
     spare = [(float("inf"), 0)]
-    ends = _queue_ends(table)
+    ends, margin = _queue_ends(table), link_margin_ticks(table.board)
     for tick, k in zip(at.tolist(), owner.tolist(), strict=True):
         if ends[k] < last:
-            spare.append((int(starts[ends[k]] - tick - LINK_MARGIN_TICKS) / TICKS_HZ - float(needs_s[k]), k))
+            spare.append((int(starts[ends[k]] - tick - margin) / TICKS_HZ - float(needs_s[k]), k))
     least, k = min(spare)
     if least == float("inf"):
         return at_least(name, float(starts[-1]) / TICKS_HZ, 0.0, "s", "the queue holds the whole rest of the motion")

@@ -11,15 +11,12 @@ from planarm.scene import Scene
 from planarm.stepping.plan import SegmentPlan
 from planarm.stepping.quantise import quantise
 from planarm.stepping.segments import Coding, compress, expand
-from planarm.stepping.slowing import SpeedLimit, missing_road_ticks, slower
+from planarm.stepping.slowing import Road, SpeedLimit, lacks_road, slower
 from planarm.stepping.stopping import allowances
 from planarm.stepping.train import JointSteps, StepTrain
 from planarm.trajectory.motion import Trajectory
 
-MOST_ROUNDS = 16
-
-TIGHTER = 0.9
-"""What the device holds is known once the segments are made; if they hold less, a little less is taken for it."""
+MOST_ROUNDS = 40
 
 SAME_TICKS = 32
 """Two motions that part at a border may make a step before it, or one that was taken across it, so much apart."""
@@ -75,7 +72,7 @@ def go_on(
     made = [len(joint.ticks) for joint in expand(SegmentPlan(segments, 0, old.start_usteps, wiring=old.wiring)).steps]
 
     def encoded(trajectory: Trajectory) -> tuple[StepTrain, SegmentPlan]:
-        train = with_first_steps(old, made, quantise(trajectory, scene.joints, scene.coupling))
+        train = with_first_steps(old, made, quantise(trajectory, scene.joints, scene.coupling, scene.wiring))
         plan = compress(train, coding, kept=segments)
         durations = [segment.duration_flags >> 1 for segment in plan.segments]
         return train, replace(plan, allowances=(*told, *allowances(trajectory, scene, durations)[kept:]))
@@ -103,16 +100,15 @@ def _until_stops_fit(
 ) -> tuple[Trajectory, StepTrain, SegmentPlan]:
     """Time and encode, slower until the device holds the path of every stop from segment `first` on."""
     limit: SpeedLimit | None = None
-    road_ticks: float | None = None
+    road: Road | None = None
     for left in range(MOST_ROUNDS, 0, -1):
         trajectory = timing(limit)
-        lower = None if road_ticks is None or left == 1 else slower(trajectory, scene, road_ticks, limit)
+        lower = None if road is None or left == 1 else slower(trajectory, scene, road, limit)
         if lower is not None:
             limit = lower
             continue
         train, plan = encoded(trajectory)
-        missing = missing_road_ticks(plan, first)
-        if missing is None:
+        if not lacks_road(plan, first):
             return trajectory, train, plan
-        road_ticks = missing if road_ticks is None else TIGHTER * road_ticks
+        road = Road.of(plan, trajectory)
     return trajectory, train, plan

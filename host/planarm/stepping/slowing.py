@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 
 from planarm.scene import Scene
 from planarm.stepping.plan import SegmentPlan
@@ -16,15 +17,25 @@ from planarm.stepping.stopping import allowances, held_until, slice_lengths
 from planarm.stepping.table import SegmentTable, segment_bytes, table_of
 from planarm.stepping.train import Floats, Ticks
 from planarm.trajectory.motion import Trajectory
+from planarm_wire.boards import Board
 from planarm_wire.messages import SLICE_TICKS, TICKS_HZ
 
 LINK_MARGIN_TICKS = 240_000
-"""15 ms: how long what was executed is not yet made good, since a reply takes up to 10 ms and a message 4 ms."""
+"""15 ms: how long what was executed is not yet made good by two joints, since a reply takes up to 10 ms and a message 4
+ms."""
+LINK_MARGIN_JOINT_TICKS = 40_000
+"""What each further joint of the board adds: it makes status and message longer and their reading slower. With 15.2 ms
+a board of four was seen to slow down by 0.4 ms."""
 
 LEAST_FACTOR = 0.6
 MOST_FACTOR = 0.97
-"""Bounds of one round's change of speed. A stop's path time grows with the speed, so the share of it that there is road
-for is the change; more than one round is needed since it depends on the motion ahead, too."""
+"""Bounds of one round's change of speed. A stop's path time grows with the speed and the time that a stretch of path
+lasts falls with it, so the change is the root of the share of a stop that there is road for; more than one round is
+needed since both depend on the motion ahead, too."""
+
+SMOOTH_SLICES = 48
+"""Changes of the limit are spread over so many slices to either side: a jagged limit makes a jagged motion, and that
+takes more bytes."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -63,8 +74,13 @@ def shortfall_ticks(plan: SegmentPlan, table: SegmentTable) -> Floats:
     starts = table.starts
     held = held_until(starts, segment_bytes(table), table.board.queue_bytes)
     needs = np.array([allowance.need_ticks for allowance in plan.allowances])
-    spare = held - last_slices(table) - needs - LINK_MARGIN_TICKS
+    spare = held - last_slices(table) - needs - link_margin_ticks(table.board)
     return np.where(held < starts[-1], -spare, -float(starts[-1]))
+
+
+def link_margin_ticks(board: Board) -> int:
+    """Return by how much more path than a stop takes a board has to hold when its queue is full."""
+    return LINK_MARGIN_TICKS + LINK_MARGIN_JOINT_TICKS * (board.joints - 2)
 
 
 def last_slices(table: SegmentTable) -> Ticks:
@@ -73,20 +89,45 @@ def last_slices(table: SegmentTable) -> Ticks:
     return np.asarray(table.starts[:-1] + (table.durations - 1) // lengths * lengths)
 
 
-def missing_road_ticks(plan: SegmentPlan, first: int = 0) -> float | None:
-    """Return how much path the device holds where stops do not fit, on average; None where all stops fit.
+ROAD_SHARE = 0.95
+"""Of the road found, what a slower motion is sure to have about: it is coded anew, into other segments."""
 
-    Segments from number `first` on are looked at.
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Road:
+    """How far along its path the device's queue reaches, from everywhere.
+
+    The bytes of a stretch of path depend little on how fast it is passed, so it is nearly that of a slower motion.
+
+    Attributes:
+        s: path parameters of the segments' starts, ascending, shape (n,).
+        end_s: how far the queue reaches while each segment runs; the path's end where it holds all that is left.
     """
-    if not plan.allowances:
-        return None
-    table = table_of(plan)
-    lacking = shortfall_ticks(plan, table) > 0.0
-    lacking[:first] = False
-    if not lacking.any():
-        return None
-    held = held_until(table.starts, segment_bytes(table), table.board.queue_bytes)
-    return float((held - last_slices(table))[lacking].mean())
+
+    s: Floats
+    end_s: Floats
+
+    @classmethod
+    def of(cls, plan: SegmentPlan, trajectory: Trajectory) -> Self:
+        """Return a little less than the road that a plan of a motion was found to have."""
+        table = table_of(plan)
+        held = held_until(table.starts, segment_bytes(table), table.board.queue_bytes)
+        s = _path_parameter(trajectory, table.starts[:-1] / TICKS_HZ)
+        whole = held >= table.starts[-1]
+        end_s = np.where(whole, trajectory.s[-1], s + ROAD_SHARE * (_path_parameter(trajectory, held / TICKS_HZ) - s))
+        return cls(s, end_s)
+
+    def ticks(self, trajectory: Trajectory, at_s: Floats) -> Floats:
+        """Return how long it lasts from times in a motion, infinite where it reaches the path's end."""
+        running = np.searchsorted(self.s, _path_parameter(trajectory, at_s), side="right") - 1
+        end_s = self.end_s[np.maximum(running, 0)]
+        lasts = (trajectory.time_at(end_s) - at_s) * TICKS_HZ
+        return np.where(end_s >= trajectory.s[-1], np.inf, lasts)
+
+
+def lacks_road(plan: SegmentPlan, first: int = 0) -> bool:
+    """Tell whether a stop does not fit into what the device holds, in any segment from number `first` on."""
+    return bool(plan.allowances) and bool((shortfall_ticks(plan, table_of(plan))[first:] > 0.0).any())
 
 
 def road_ticks(plan: SegmentPlan) -> float:
@@ -96,26 +137,34 @@ def road_ticks(plan: SegmentPlan) -> float:
     partly = held < table.starts[-1]
     if not partly.any():
         return float("inf")
-    return max(float(SLICE_TICKS), float((held - last_slices(table))[partly].mean()) - LINK_MARGIN_TICKS)
+    return max(float(SLICE_TICKS), float((held - last_slices(table))[partly].mean()) - link_margin_ticks(plan.board))
 
 
-def slower(trajectory: Trajectory, scene: Scene, road_ticks: float, before: SpeedLimit | None) -> SpeedLimit | None:
-    """Return a lower limit of the speed where a stop takes more than a road of this length; None where none does.
+def slower(trajectory: Trajectory, scene: Scene, road: Road, before: SpeedLimit | None) -> SpeedLimit | None:
+    """Return a lower limit of the speed where a stop takes more than there is road for; None where none does.
 
     The motion is looked at in slices as the device cuts them.
     """
     count = -(-int(trajectory.duration_s * TICKS_HZ) // SLICE_TICKS)
     needs = np.array([one.need_ticks for one in allowances(trajectory, scene, [SLICE_TICKS] * count)])
     starts = SLICE_TICKS * np.arange(count + 1)
-    fits = (road_ticks - LINK_MARGIN_TICKS) / np.maximum(needs, 1.0)
-    lacking = np.flatnonzero((fits < 1.0) & (starts[:-1] + road_ticks < starts[-1]))
+    fits = (road.ticks(trajectory, starts[:-1] / TICKS_HZ) - link_margin_ticks(scene.board)) / np.maximum(needs, 1.0)
+    lacking = np.flatnonzero(fits < 1.0)
     if not len(lacking):
         return None
-    factors = np.ones(len(starts))
+    factors, changes = np.ones(len(starts)), np.clip(np.sqrt(np.maximum(fits, 0.0)), LEAST_FACTOR, MOST_FACTOR)
     for k in lacking.tolist():
         end = int(np.searchsorted(starts, starts[k] + needs[k]))
-        factors[k : end + 1] = np.minimum(factors[k : end + 1], np.clip(fits[k], LEAST_FACTOR, MOST_FACTOR))
-    return SpeedLimit.lower(trajectory, starts / TICKS_HZ, factors, before)
+        factors[k : end + 1] = np.minimum(factors[k : end + 1], changes[k])
+    return SpeedLimit.lower(trajectory, starts / TICKS_HZ, _spread(factors), before)
+
+
+def _spread(factors: Floats) -> Floats:
+    """Return factors that change slowly from slice to slice, nowhere above them: means of the neighbours' least."""
+    width = 2 * SMOOTH_SLICES + 1
+    padded = np.pad(factors, 2 * SMOOTH_SLICES, mode="edge")
+    least = sliding_window_view(padded, width).min(axis=1)
+    return np.asarray(sliding_window_view(least, width).mean(axis=1))
 
 
 def _path_parameter(trajectory: Trajectory, times_s: Floats) -> Floats:

@@ -44,10 +44,11 @@ def look(transport: Transport, port: str, scene: Scene, positions: Positions) ->
     """Ask a board where its arm is.
 
     Raises:
-        LinkError: it does not answer.
+        LinkError: it does not answer, or is not the scene's board.
         DeviceFault: it refuses.
     """
     session = open_session(transport)
+    session.require_board(scene.board)
     status = request(transport, session, Query())
     assert session.welcome is not None, "an open session has a welcome"
     how = positions.how(port, session.welcome.boot_nonce, arm_hash(asdict(scene)))
@@ -75,17 +76,34 @@ def tell(
     positions.remember(port, session.welcome.boot_nonce, arm_hash(asdict(scene)), how)
 
 
-def usteps_at(scene: Scene, tip_cm: tuple[float, float]) -> tuple[int, ...]:
-    """Return where the motors stand with the tip at a point, on the scene's elbow side.
+def start_usteps(scene: Scene) -> tuple[int, ...]:
+    """Return where the motors stand at the task's start: at its angles, or with the tip at its point.
 
     Raises:
-        UsageError: it is out of reach.
+        UsageError: the point is out of reach.
+    """
+    task = scene.task
+    return usteps_at(scene, task.start_cm) if task.start_rad is None else nearest(scene, np.array(task.start_rad))
+
+
+def nearest(scene: Scene, q_rad: NDArray[np.float64]) -> tuple[int, ...]:
+    """Return where the motors stand nearest to joint angles."""
+    return tuple(int(n) for n in np.floor(Transmission.of(scene).usteps(q_rad) + 0.5))
+
+
+def usteps_at(scene: Scene, tip_cm: tuple[float, float]) -> tuple[int, ...]:
+    """Return where the motors of two joints stand with the tip at a point, on the scene's elbow side.
+
+    Raises:
+        UsageError: it is out of reach, or the arm has many poses there.
     """
     arm = Arm.from_spec(scene.arm)
+    if arm.links != 2:
+        raise UsageError(f"an arm with {arm.links} links has not one pose at a point; give joint angles (--deg)")
     q_rad = inverse_2r(arm, tip_cm, "down" if scene.arm.elbow == "down" else "up")
     if np.isnan(q_rad).any():
         raise UsageError(f"({tip_cm[0]:g}, {tip_cm[1]:g}) cm is out of the arm's reach; give a point that it reaches")
-    return tuple(int(n) for n in np.floor(Transmission.of(scene).usteps(q_rad) + 0.5))
+    return nearest(scene, q_rad)
 
 
 def pose_of(scene: Scene, usteps: tuple[int, ...]) -> tuple[NDArray[np.float64], tuple[float, float]]:

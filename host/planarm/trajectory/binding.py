@@ -13,6 +13,9 @@ from planarm.trajectory.timing import solve
 
 LimitName = Literal["speed", "acceleration", "torque"]
 
+SAME = 1e-6
+"""Durations that differ by less than this share are the same."""
+
 
 @dataclass(frozen=True, slots=True)
 class Binding:
@@ -29,15 +32,18 @@ class TimingReport:
 
     Attributes:
         binding: the limits in the order of their shares; every moment counts for the limit used most in it.
-        duration_s: of the motion.
+        duration_s: of the motion that these limits allow.
         acceleration_share: the share of the acceleration that it uses.
         full_acceleration_s: what it would take with all of the acceleration, nothing left for a stop.
+        executed_s: what it takes in the end: more, where it is slower because the device's queue holds less of the path
+            than a stop takes.
     """
 
     binding: tuple[Binding, ...]
     duration_s: float
     acceleration_share: float
     full_acceleration_s: float
+    executed_s: float
 
     @property
     def braking_cost(self) -> float:
@@ -47,7 +53,8 @@ class TimingReport:
     def figures(self) -> dict[str, Any]:
         """Return the report as plain values for JSON."""
         return {
-            "motion_s": round(self.duration_s, 6),
+            "motion_s": round(self.executed_s, 6),
+            "motion_unslowed_s": round(self.duration_s, 6),
             "motion_full_acceleration_s": round(self.full_acceleration_s, 6),
             "acceleration_share": self.acceleration_share,
             "binding_limits": [
@@ -60,7 +67,11 @@ class TimingReport:
         if not self.binding:
             return "nothing moves"
         held = ", ".join(f"joint {b.joint} {b.limit} {100.0 * b.share:.0f} %" for b in self.binding if b.share >= 0.005)
-        return f"held back by {held} of the time; keeping a stop possible costs {100.0 * self.braking_cost:.1f} %"
+        words = f"held back by {held} of the time; keeping a stop possible costs {100.0 * self.braking_cost:.1f} %"
+        if self.executed_s <= self.duration_s * (1.0 + SAME):
+            return words
+        more = 100.0 * (self.executed_s / self.duration_s - 1.0)
+        return f"{words}, and {more:.1f} % more because the board's queue would hold too little path for it"
 
 
 def report_timing(trajectory: Trajectory, limits: Limits, *, fixed: bool = False) -> TimingReport:
@@ -72,7 +83,7 @@ def report_timing(trajectory: Trajectory, limits: Limits, *, fixed: bool = False
         fixed: its times are those of appointments, which more acceleration does not change.
     """
     if len(trajectory.t_s) == 1:
-        return TimingReport((), 0.0, limits.acceleration_share, 0.0)
+        return TimingReport((), 0.0, limits.acceleration_share, 0.0, 0.0)
     grid = Grid.on(trajectory.path, trajectory.s, trajectory.s_dot**2)
     use = limit_use(trajectory, limits, grid.samples)
     names: tuple[LimitName, ...] = ("speed", "acceleration", "torque")
@@ -84,7 +95,8 @@ def report_timing(trajectory: Trajectory, limits: Limits, *, fixed: bool = False
         if shares[k] > 0.0
     ]
     full_s = trajectory.duration_s if fixed else _full_acceleration_s(trajectory, grid, limits)
-    return TimingReport(tuple(binding), trajectory.duration_s, limits.acceleration_share, full_s)
+    duration_s = trajectory.duration_s
+    return TimingReport(tuple(binding), duration_s, limits.acceleration_share, full_s, duration_s)
 
 
 def _full_acceleration_s(trajectory: Trajectory, grid: Grid, limits: Limits) -> float:
