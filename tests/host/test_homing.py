@@ -130,7 +130,7 @@ def test_homing_needs_a_switch_on_every_joint(scene, positions):
 def test_the_proof_is_printed_and_a_loss_is_an_exit_code(monkeypatch, capsys, counted, code, said):
     """The words are those of docs/board.md."""
     homed = Homed((Touched(1, counted, 2711, 64), Touched(2, -900, -900, 64)), "homed")
-    monkeypatch.setattr("planarm.link.transport.open_transport", lambda *_line: BytesIO())
+    monkeypatch.setattr("planarm.link.transport.open_transport", lambda *_line, **_board: BytesIO())
     monkeypatch.setattr("planarm.operations.homing.prove_steps", lambda *_arm: homed)
     with pytest.raises(SystemExit) as left:
         main(["home", str(SCENE), "--prove", "--port", PORT])
