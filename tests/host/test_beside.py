@@ -1,0 +1,67 @@
+"""Work beside a stream: in a thread for boards, and in an emulator's time as long as it takes."""
+
+import threading
+
+import pytest
+
+from planarm.errors import NoPathError
+from planarm.operations.beside import ALLOWED, AsLong, InThread
+
+
+def test_a_thread_works_while_its_owner_goes_on():
+    may_end, where = threading.Event(), []
+
+    def work():
+        where.append(threading.get_ident())
+        assert may_end.wait(10.0)
+        return 7
+
+    beside = InThread()
+    future = beside.begin(work, 0.0)
+    assert not beside.has_ended(future, 1e9)  # whatever the clock says
+    may_end.set()
+    assert future.result(10.0) == 7
+    assert beside.has_ended(future, 0.0)
+    assert where != [threading.get_ident()]
+    beside.close()
+    assert beside.allow_s(0.1) == pytest.approx(ALLOWED * 0.1)
+
+
+def test_what_fails_in_a_thread_is_raised_where_the_result_is_asked_for():
+    def work():
+        raise NoPathError("none")
+
+    beside = InThread()
+    future = beside.begin(work, 0.0)
+    with pytest.raises(NoPathError, match="none"):
+        future.result(10.0)
+    beside.close()
+
+
+def test_in_an_emulators_time_a_result_is_held_back_as_long_as_it_took():
+    host_s = iter([100.0, 100.25, 200.0, 201.0])
+    beside = AsLong(lambda: next(host_s))
+    future = beside.begin(lambda: "made", 5.0)
+    assert [beside.has_ended(future, at_s) for at_s in (5.0, 5.24, 5.25)] == [False, False, True]
+    assert future.result() == "made"
+    assert beside.allow_s(0.1) == pytest.approx(ALLOWED * 0.1)
+
+    def fails():
+        raise NoPathError("none")
+
+    failed = beside.begin(fails, 6.0)
+    assert not beside.has_ended(failed, 6.9)
+    with pytest.raises(NoPathError):
+        failed.result()
+
+
+def test_a_time_that_is_said_holds_for_all_work():
+    beside = AsLong(lambda: 0.0, takes_s=0.08)
+    future = beside.begin(lambda: 1, 2.0)
+    assert [beside.has_ended(future, at_s) for at_s in (2.07, 2.08)] == [False, True]
+    assert beside.allow_s(5.0) == 0.08
+
+
+def test_a_fault_of_the_program_is_not_kept_for_later():
+    with pytest.raises(ZeroDivisionError):
+        AsLong(lambda: 0.0).begin(lambda: 1 // 0, 0.0)
