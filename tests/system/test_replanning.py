@@ -133,7 +133,7 @@ def test_random_obstacles_at_random_times(sized, plan, capsys):
     counts = {verdict: verdicts.count(verdict) for verdict in ("kept", "avoided", "unavoidable")}
     if len(verdicts) >= 100:
         assert min(counts.values()) > 0, counts
-        assert len(waits_ms["at speed"]) > 0.5 * counts["avoided"], stops
+        assert len(waits_ms["at speed"]) > 0.3 * counts["avoided"], stops
         with capsys.disabled():
             print(f"\n{counts}, goal reached {reached}; left at speed {len(waits_ms['at speed'])}")
             for how, values in waits_ms.items():

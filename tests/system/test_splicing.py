@@ -24,6 +24,13 @@ def prompt():
     return AsLong(perf_counter, PLANNING_S)
 
 
+class Slow(AsLong):
+    """Takes longer than it is allowed."""
+
+    def allow_s(self, _known_s):
+        return PLANNING_S
+
+
 @pytest.fixture(scope="module")
 def plan():
     return first_plan(SCENE, quiet)[1]
@@ -64,11 +71,6 @@ def test_planning_that_takes_too_long_lets_the_arm_rest_on_its_path_and_go_on(pl
     """The device holds nothing behind the border, so it rests before it by itself, and goes on when more comes."""
     x, y = tip_at(plan, 0.85)
     arrival = Arrival(0.2 * plan.trajectory.duration_s, circle(x, y, 2.0))
-
-    class Slow(AsLong):
-        def allow_s(self, _known_s):
-            return PLANNING_S
-
     done = Outcome([arrival], beside=Slow(perf_counter, 1.5))
     assert done.result.reached, done.result.reason
     assert len(done.spliced) == 1
@@ -146,6 +148,18 @@ def test_a_motion_from_where_the_arm_was_stopped_is_left_at_speed_too(plan):
     assert [new.spliced_at_s is None for new in done.result.new_plans] == [True, False], done.result.encounters
     assert done.result.reached, done.result.reason
     assert done.result.plans[-1].scene.task.start_rad == second.scene.task.start_rad
+    assert not any(done.record.lost_full_steps)
+    done.require_clear()
+
+
+def test_where_the_arm_rested_on_the_way_is_known_when_the_next_obstacle_comes(plan):
+    """The path clock stood still for a second, so the arm is not where it would be by the time since the start."""
+    x, y = tip_at(plan, 0.85)
+    begin = Arrival(0.2 * plan.trajectory.duration_s, circle(x, y, 2.0))
+    second = Outcome([begin], beside=Slow(perf_counter, 1.5)).result.plans[-1]
+    u, v = tip_at(second, 0.95)
+    done = Outcome([begin, Arrival(begin.at_s + 1.55, circle(u, v, 1.0))], beside=Slow(perf_counter, 1.5))
+    assert [one.verdict for one in done.result.encounters] == ["avoided", "avoided"], done.result.encounters
     assert not any(done.record.lost_full_steps)
     done.require_clear()
 

@@ -385,6 +385,19 @@ class Stream:
         """Whole segments of this plan executed, by the last status."""
         return self._executed
 
+    def path_span_s(self, now_s: float, slowness: float) -> Span:
+        """Return where on the path the motion is by now, by the last status.
+
+        Args:
+            now_s: later than the status.
+            slowness: by how much the device's clock may be faster than this one, as a share.
+        """
+        if self.ledger_before is None:
+            return Span(0.0, 0.0)
+        span_s = self._path_time.span_s(self._executed, moved_usteps(self.ledger_before, self._status.ledger))
+        since_s = max(0.0, now_s - self._session.made_s.least)
+        return Span(span_s.least, span_s.most + (1.0 + slowness) * since_s)
+
     def _follow(self, now_s: float) -> None:
         status = self._session.status
         if status is None or self.ledger_before is None:

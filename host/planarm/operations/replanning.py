@@ -25,7 +25,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from planarm.errors import CertificateError, NoPathError, SceneError, TimingError
+from planarm.errors import CertificateError, NoPathError, PlanarmError, SceneError, TimingError
 from planarm.link.clock import RealClock
 from planarm.link.exchange import stream_plan
 from planarm.link.position import StreamError, moved_usteps
@@ -135,6 +135,8 @@ class _Splice:
     """Path time at which the old motion would meet an obstacle."""
     noticed_s: float
     work: Future[tuple[Plan, Border]]
+    encounter: int
+    """The one that it is for."""
     stale: bool = False
     """Another obstacle has come since the work began."""
 
@@ -186,12 +188,12 @@ class _Run:
     def rest(self) -> None:
         """Wait for work that nobody wants any more, and let the roadmap know all obstacles: the arm rests."""
         if self.splice is not None:
-            self.splice.work.exception()
+            _require_sound(self.splice.work)
             self.splice = None
         self._tell_roadmap()
 
     def _meet(self, stream: Stream, obstacle: Obstacle, now_s: float) -> None:
-        least_s, most_s = whereabouts_s(self.plan, stream, now_s)
+        least_s, most_s = whereabouts_s(stream, now_s)
         contact_s = contact_time_s(self.plan, shape_of(obstacle), self.margin_cm, least_s)
         verdict, quick = judge_contact(self.plan, contact_s, most_s)
         self.untold.append(len(self.encounters))
@@ -208,7 +210,7 @@ class _Run:
             return
         because = "" if verdict == "unavoidable" else self._leave(stream, contact_s, least_s, most_s, now_s)
         if because or verdict == "unavoidable":
-            self._stop(stream, verdict, quick, because, now_s)
+            self._stop(stream, verdict, quick, because, now_s, len(self.encounters) - 1)
 
     def _leave(self, stream: Stream, contact_s: float, least_s: float, most_s: float, now_s: float) -> str:
         """Begin to leave the motion at speed; return why not, empty when it is begun."""
@@ -224,7 +226,8 @@ class _Run:
         if border.path_s >= contact_s:
             return "it is before where the motion could be left"
         stream.keep_back(border.segment)
-        self.splice = _Splice(border, contact_s, now_s, self._begin(border, contact_s, least_s, now_s))
+        work = self._begin(border, contact_s, least_s, now_s)
+        self.splice = _Splice(border, contact_s, now_s, work, len(self.encounters) - 1)
         return ""
 
     def _begin(self, first: Border, contact_s: float, from_s: float, now_s: float) -> Future[tuple[Plan, Border]]:
@@ -236,10 +239,11 @@ class _Run:
 
     def _end_splice(self, stream: Stream, splice: _Splice, now_s: float) -> None:
         """Take the motion that was planned, plan once more, or stop."""
-        least_s, most_s = whereabouts_s(self.plan, stream, now_s)
+        least_s, most_s = whereabouts_s(stream, now_s)
         self.splice = None
         self._tell_roadmap()
         if splice.stale:
+            _require_sound(splice.work)
             work = self._begin(splice.border, splice.contact_s, least_s, now_s)
             self.splice = replace(splice, work=work, stale=False)
             return
@@ -247,15 +251,17 @@ class _Run:
             plan, border = splice.work.result()
         except (NoPathError, SceneError, TimingError, CertificateError) as error:
             _, quick = judge_contact(self.plan, splice.contact_s, most_s)
-            self._stop(stream, "avoided", quick, str(error), splice.noticed_s)
+            self._stop(stream, "avoided", quick, str(error), splice.noticed_s, splice.encounter)
             return
         stream.go_on_with(plan.segments.segments, plan.segments.allowances)
         self.take(plan, NewPlan(0.0, 1e3 * (now_s - splice.noticed_s), border.path_s))
 
-    def _stop(self, stream: Stream, verdict: Verdict, quick: bool, because: str, noticed_s: float) -> None:
+    def _stop(
+        self, stream: Stream, verdict: Verdict, quick: bool, because: str, noticed_s: float, encounter: int
+    ) -> None:
         stream.stop(quick=quick)
         self.stopping, self.noticed_s = verdict, noticed_s
-        self.encounters[-1] = replace(self.encounters[-1], stopped_because=because)
+        self.encounters[encounter] = replace(self.encounters[encounter], stopped_because=because)
 
     def _tell_roadmap(self) -> None:
         """Let the roadmap and the search know the obstacles that they do not know; nobody else uses them meanwhile."""
@@ -292,9 +298,10 @@ def run_live(
         PlanarmError: the first plan cannot be made, or the line or the board fails.
     """
     task, plan = first or first_plan(scene, notice)
-    beside = beside or (InThread() if isinstance(transport.clock, RealClock) else AsLong(host_s))
-    run = _Run(scene, task, plan, obstacles, transport, host_s, beside, planning_margin_cm(scene), plans=[plan])
-    with closing(beside):
+    own = InThread() if isinstance(transport.clock, RealClock) else AsLong(host_s)
+    margin_cm = planning_margin_cm(scene)
+    with closing(own):
+        run = _Run(scene, task, plan, obstacles, transport, host_s, beside or own, margin_cm, plans=[plan])
         end_rad, reason = _legs(run, notice)
     met, made, plans = tuple(run.encounters), tuple(run.new_plans), tuple(run.plans)
     return LiveResult(not reason, reason, met, made, plans, end_rad, run.began_s or 0.0)
@@ -345,6 +352,13 @@ def plan_from(scene: Scene, task: RoadmapTask, rest_rad: Floats, notice: Notice)
     start = replace(scene.task, start_cm=(float(x), float(y)), start_rad=tuple(map(float, rest_rad)))
     from_here = replace(scene, task=start)
     return plan_scene(from_here, notice, route_through(from_here, margin_cm, poses, cost))
+
+
+def _require_sound(work: Future[tuple[Plan, Border]]) -> None:
+    """Wait for work whose result nobody wants; a fault of the program is raised all the same."""
+    error = work.exception()
+    if error is not None and not isinstance(error, PlanarmError):
+        raise error
 
 
 def _stream_leg(run: _Run) -> tuple[Floats, Verdict | None]:

@@ -39,7 +39,8 @@ from planarm.trajectory.motion import Trajectory
 from planarm.trajectory.timing import fastest_motion
 from planarm.workspace.joint_proof import JointWorld, joint_world, prove_joint_line
 from planarm.workspace.proof import PROVED
-from planarm_wire.messages import SLICE_TICKS, TICKS_HZ
+from planarm_wire.messages import NEED_UNIT_TICKS, SLICE_TICKS, TICKS_HZ
+from planarm_wire.rates import MESSAGE_SEGMENTS
 from planarm_wire.steps import duration_ticks
 
 Floats = NDArray[np.float64]
@@ -48,6 +49,8 @@ HANDED_OVER_TICKS = 4 * SLICE_TICKS
 """The device decides this long ahead whether it has to slow down."""
 STARVING_MARGIN_TICKS = 65_536
 """What the device wants to hold beyond what a stop takes."""
+MARGIN_TICKS = STARVING_MARGIN_TICKS + LINK_MARGIN_TICKS
+"""What is to be held beyond a stop's need, with what the line may take."""
 MOST_CORNERS = 6
 """Corners of the old way up to which it may be left."""
 BETWEEN_RAD = 0.15
@@ -83,7 +86,10 @@ def why_not(plan: Plan) -> str:
     return ""
 
 
-MARGIN_TICKS = STARVING_MARGIN_TICKS + LINK_MARGIN_TICKS
+def _neighbours(values: list[float]) -> list[list[float]]:
+    """Return for each value those that may be told in a message with it."""
+    wide = MESSAGE_SEGMENTS - 1
+    return [values[max(0, k - wide) : k + wide + 1] for k in range(len(values))]
 
 
 def first_border(plan: Plan, sent: int, ready_s: float) -> Border | None:
@@ -95,13 +101,15 @@ def first_border(plan: Plan, sent: int, ready_s: float) -> Border | None:
         ready_s: the path time by which the other motion is there; until then the device must not miss what comes next.
     """
     ticks, ready_ticks, wanted = 0, ready_s * TICKS_HZ, 0.0
-    for k, (segment, allowance) in enumerate(zip(plan.segments.segments, plan.segments.allowances, strict=True)):
+    # A message tells the largest need of its segments, rounded up.
+    needs = [max(near) for near in _neighbours([allowance.need_ticks for allowance in plan.segments.allowances])]
+    for k, (segment, need_ticks) in enumerate(zip(plan.segments.segments, needs, strict=True)):
         if k >= max(sent, 1) and ticks >= wanted and ticks > ready_ticks:
             return Border(k, ticks)
         end = ticks + duration_ticks(segment)
         if ticks <= ready_ticks + HANDED_OVER_TICKS:
             last_slice = min(float(end), ready_ticks + HANDED_OVER_TICKS)
-            wanted = max(wanted, last_slice + SLICE_TICKS + allowance.need_ticks + MARGIN_TICKS)
+            wanted = max(wanted, last_slice + SLICE_TICKS + need_ticks + NEED_UNIT_TICKS + MARGIN_TICKS)
         ticks = end
     return None
 

@@ -84,9 +84,11 @@ def rest_time_s(plan: Plan, from_s: float, share: float) -> float:
     return min(ordered_s + SLICE_TICKS / TICKS_HZ + float(needs_s[first:last].max()), sum(durations) / TICKS_HZ)
 
 
-def whereabouts_s(plan: Plan, stream: Stream, now_s: float) -> tuple[float, float]:
-    """Return the least and the largest path time of the arm: by the ledger, and by the fastest board's clock."""
-    segments = plan.segments.segments[: stream.executed_segments]
-    least_s = sum(map(duration_ticks, segments)) / TICKS_HZ
+def whereabouts_s(stream: Stream, now_s: float) -> tuple[float, float]:
+    """Return the least and the largest path time of the arm: by the ledger, and by the fastest board's clock since.
+
+    The motion has also not been going on for longer than since its start.
+    """
     began_s = stream.began_s.least if stream.began_s else stream.started_s
-    return least_s, max(least_s, (now_s - began_s) * (1.0 + MOST_SLOWNESS))
+    span_s = stream.path_span_s(now_s, MOST_SLOWNESS)
+    return span_s.least, max(span_s.least, min(span_s.most, (now_s - began_s) * (1.0 + MOST_SLOWNESS)))

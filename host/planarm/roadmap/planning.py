@@ -72,7 +72,7 @@ class RoadmapTask:
 
 
 def joint_route_of(scene: Scene, roadmap: Roadmap, answer: GraphAnswer) -> JointRoute:
-    """Return a way of two links on a roadmap as a way in joint space."""
+    """Return a way on a roadmap as a way in joint space."""
     bounded = bound(roadmap.bounds(), int(answer.nodes[0]), int(answer.nodes[-1]))
     return made_route(scene, roadmap.poses_rad[answer.nodes], OBJECTIVES[roadmap.cost], answer.cost, bounded)
 

@@ -75,9 +75,17 @@ def go_on(
         train = with_first_steps(old, made, quantise(trajectory, scene.joints, scene.coupling, scene.wiring))
         plan = compress(train, coding, kept=segments)
         durations = [segment.duration_flags >> 1 for segment in plan.segments]
-        return train, replace(plan, allowances=(*told, *allowances(trajectory, scene, durations)[kept:]))
+        plan = replace(plan, allowances=(*told, *allowances(trajectory, scene, durations)[kept:]))
+        tried.append((trajectory, train, plan))
+        return train, plan
 
-    return _until_stops_fit(scene, timing, encoded, kept)
+    tried: list[tuple[Trajectory, StepTrain, SegmentPlan]] = []
+    try:
+        return _until_stops_fit(scene, timing, encoded, kept)
+    except TimingError:  # it cannot be slower behind the border; where road is short the device slows down by itself
+        if not tried:
+            raise
+        return tried[-1]
 
 
 def with_first_steps(old: StepTrain, made: Sequence[int], new: StepTrain) -> StepTrain:
