@@ -17,6 +17,7 @@ from rich.table import Table
 ROOT = Path(__file__).parents[1]
 sys.path[:0] = [str(ROOT / "tests"), str(ROOT / "tests" / "firmware")]
 
+from test_firmware_boards import steady  # noqa: E402
 from test_firmware_stretch import FAST, SEGMENT_TICKS, Player  # noqa: E402
 from test_firmware_uno import Streamer  # noqa: E402
 
@@ -27,6 +28,7 @@ from planarm_wire.codec import encode  # noqa: E402
 from planarm_wire.framing import encode_frame  # noqa: E402
 from planarm_wire.messages import (  # noqa: E402
     BAUD,
+    BOARDS,
     DELIMITER,
     EMERGENCY_CODE,
     EMERGENCY_REPEATS,
@@ -63,10 +65,12 @@ def main() -> None:
     rows = [
         saturated("50,000 : 49,816 steps/s", 320, 1.0037, seconds),
         saturated("65,041 : 40,170 steps/s", 246, 65_041 / 40_170, seconds),
-        saturated("62,500 steps/s on both", 256, 1.0, seconds),
-        streamed("65,041 : 64,801 steps/s, the host's window", fast(246, 1.0037, 4 * SLICE_TICKS, 70)),
-        streamed("random motion to 50,000 steps/s, window kept full", restless(1, 320, 1450), busy_line=True),
-        streamed("random motion to 65,041 steps/s, the host's window", restless(1, 246, 1450)),
+        saturated("71,111 : 70,849 steps/s", 225, 1.0037, seconds),
+        cruising("65,041 : 65,000 steps/s", 246, 65_041 / 65_000, seconds),
+        cruising("71,111 : 70,849 steps/s", 225, 1.0037, seconds),
+        streamed("random motion to 50,000 steps/s, window kept full", restless(1, 320, round(145 * seconds))),
+        streamed("random motion to 71,111 steps/s, window kept full", restless(1, 225, round(145 * seconds))),
+        four_saturated(seconds),
     ]
     step, stack, interrupts = watched()
     rows += [interrupts, hold_latency(), emergency_latency(), ring()]
@@ -117,7 +121,42 @@ def saturated(name: str, interval: int, ratio: float, seconds: float) -> tuple[s
     """Steps at constant rates while valid frames fill the line without a gap."""
     duration = 30_000 * interval
     motion = end_motion(fast(interval, ratio, duration, max(1, round(seconds * TICKS_HZ / duration))))
-    firmware = EmulatedFirmware(IMAGE)
+    board = play_saturated(EmulatedFirmware(IMAGE), motion, duration)
+    status = board.ask()
+    told = deviation(board, motion) if status.fault is Fault.NONE else f"{status.fault.name}"
+    return (
+        f"{name}, {duration * len(motion) / TICKS_HZ:.1f} s, line saturated",
+        f"{told}; {status.overruns} bytes lost in the USART",
+    )
+
+
+def cruising(name: str, interval: int, ratio: float, seconds: float) -> tuple[str, str]:
+    """Constant rates, streamed with the window kept full."""
+    duration = 4 * SLICE_TICKS
+    motion = fast(interval, ratio, duration, max(20, round(seconds * TICKS_HZ / duration)))
+    return streamed(f"{name}, window kept full", motion)
+
+
+def four_saturated(seconds: float) -> tuple[str, str]:
+    """Four joints at 15,000 steps/s each while valid frames fill the line without a gap."""
+    duration = round(seconds * TICKS_HZ / 8)
+    motion = steady("uno_four", TICKS_HZ // 15_000, seconds, duration)
+    board = play_saturated(EmulatedFirmware(IMAGE.with_name("uno_four.hex"), BOARDS["uno_four"]), motion, duration)
+    status = board.ask()
+    schedule = Schedule.of(motion)
+    begin = board.rises(0)[0] - schedule.steps[0][0][0]
+    off = [
+        [rise - begin - tick for rise, (tick, _) in zip(board.rises(joint), steps, strict=False)]
+        for joint, steps in enumerate(schedule.steps)
+    ]
+    told = ", ".join(f"joint {joint + 1} {min(found)} to {max(found)} cycles" for joint, found in enumerate(off))
+    missing = sum(map(len, schedule.steps)) - sum(map(len, off))
+    fault = "" if status.fault is Fault.NONE else f"{status.fault.name}; "
+    return f"four joints at 15,000 steps/s, {seconds:.1f} s, line saturated", f"{fault}{told}; {missing} missing"
+
+
+def play_saturated(firmware: EmulatedFirmware, motion: list, duration: int) -> Board:
+    """Play a motion that the queue holds while valid frames fill the line without a gap."""
     board = Board(firmware)
     board.get_ready()
     for segment in motion:
@@ -131,16 +170,11 @@ def saturated(name: str, interval: int, ratio: float, seconds: float) -> tuple[s
         board.run(40_000)
     board.run(200_000)
     board.receive(bytes([DELIMITER]))
-    status = board.ask()
-    told = deviation(board, motion) if status.fault is Fault.NONE else f"{status.fault.name}"
-    return (
-        f"{name}, {duration * len(motion) / TICKS_HZ:.1f} s, line saturated",
-        f"{told}; {status.overruns} bytes lost in the USART",
-    )
+    return board
 
 
-def streamed(name: str, motion: list, *, busy_line: bool = False) -> tuple[str, str]:
-    """A motion streamed within the host's window of 112 bytes, which queries may keep full."""
+def streamed(name: str, motion: list) -> tuple[str, str]:
+    """A motion streamed within the host's window of 112 bytes, which queries keep full."""
     motion = end_motion(motion)
     length_ticks = sum(map(duration_ticks, motion))
     board = Board(EmulatedFirmware(IMAGE))
@@ -148,7 +182,7 @@ def streamed(name: str, motion: list, *, busy_line: bool = False) -> tuple[str, 
     for segment in motion[:16]:
         board.ask(Segments(0, 0, 0, (segment,)))
     board.ask(Start(LEAD_TICKS))
-    status = Streamer(board, motion[16:], busy_line).run(len(motion), length_ticks + TICKS_HZ)
+    status = Streamer(board, motion[16:], busy_line=True).run(len(motion), length_ticks + TICKS_HZ)
     told = deviation(board, motion) if status.fault is Fault.NONE else f"{status.fault.name}"
     return f"{name}, {length_ticks / TICKS_HZ:.1f} s", f"{told}; {status.overruns + status.ring_full} bytes lost"
 
@@ -214,10 +248,13 @@ def emergency_latency() -> tuple[str, str]:
 
 
 def ring() -> tuple[str, str]:
-    """Path time that the queue holds of the hard motion, wherever it is filled."""
-    train, axes = reference_train()
-    held_ticks = least_held_ticks(compress(train, Coding.of(axes)).segments)
-    return "path time in the queue, tests/data/reference_motion.toml", f"{held_ticks / TICKS_HZ * 1000:.0f} ms at least"
+    """Path time that the queue holds of the hard motions, wherever it is filled."""
+    told = []
+    for joints in (2, 4):
+        train, axes = reference_train(joints)
+        held_ticks = least_held_ticks(compress(train, Coding.of(axes)).segments, train.board.queue_bytes)
+        told.append(f"{held_ticks / TICKS_HZ * 1000:.0f} ms at least with {joints} joints")
+    return "path time in the queue, tests/data/reference_motion*.toml", ", ".join(told)
 
 
 if __name__ == "__main__":
