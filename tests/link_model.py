@@ -197,7 +197,8 @@ class Device:
             case Enable(on=0) if self.state is State.READY:
                 self._drop_queue(State.IDLE)
             case Clear() if self.state is not State.RUNNING:
-                self._drop_queue(State.IDLE)
+                lost = self.fault in (Fault.EMERGENCY_STOP, Fault.STOP_INPUT, Fault.HOMING_FAILED)
+                self._drop_queue(State.IDLE if lost or self.state is State.IDLE else State.READY)
                 self.fault, self.refusal = Fault.NONE, Result.OK
             case Segments() if self.state in (State.READY, State.RUNNING, State.HELD):
                 return self._append(message)

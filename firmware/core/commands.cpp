@@ -44,7 +44,7 @@ Result start(const wire::Start& told) {
 }
 
 Result clear() {
-    const Result result = try_event(Event::CLEAR);
+    const Result result = try_event(supervisor::clear_event());
     if (result == Result::OK) hal::emergency_clear();
     return result;
 }

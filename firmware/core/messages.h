@@ -104,8 +104,10 @@ enum class MessageType : uint8_t {
     SEGMENTS = 4,
     // From the host: Begins the queued motion: the first segment starts lead_ticks from now.
     START = 5,
-    // From the host: Clears a latched fault and the refusal, drops the queue and releases the
-    // drivers: fault, ready or idle to idle. Position counters stay.
+    // From the host: Clears a latched fault and the refusal and drops the queue. The drivers stay
+    // on where the position is known: ready, held, starved and most faults to ready; after
+    // emergency_stop, stop_input and homing_failed they are released, to idle; idle stays. Position
+    // counters stay.
     CLEAR = 6,
     // From the host: Goes on after a hold, also one that is still slowing down. In any other state
     // it changes nothing.
@@ -148,7 +150,7 @@ enum class State : uint8_t {
     // Executing segments, slowed down while the queue starves; more may be queued.
     RUNNING = 2,
     // Pulses stopped, first fault latched, drivers keep holding. An emergency stop may release
-    // them. CLEAR leads to idle.
+    // them. CLEAR leads to ready, or to idle where the position is lost.
     FAULT = 3,
     // Slowing down along the path towards a hold.
     HOLDING = 4,

@@ -18,8 +18,8 @@ constexpr uint16_t row(Event event, State from, State to, Outcome outcome) {
     return static_cast<uint16_t>(static_cast<unsigned>(event) << 11 | static_cast<unsigned>(from) << 7 |
                                  static_cast<unsigned>(to) << 3 | static_cast<unsigned>(outcome));
 }
-static_assert(static_cast<uint8_t>(Event::DONE) < 32 && static_cast<uint8_t>(State::HOMING) < 16 &&
-                  static_cast<uint8_t>(Outcome::REST_QUICKLY) < 8 &&
+static_assert(static_cast<uint8_t>(Event::CLEAR_KEPT) < 32 && static_cast<uint8_t>(State::HOMING) < 16 &&
+                  static_cast<uint8_t>(Outcome::FORGET) < 8 &&
                   row(Event::ENABLE, State::IDLE, State::READY, Outcome::ENERGISE) != 0,
               "the widths in a row; 0 is none");
 
@@ -41,11 +41,12 @@ const uint16_t ROWS[] HAL_FLASH = {
 
     row(Event::START, State::READY, State::RUNNING, Outcome::GO),
 
-    row(Event::CLEAR, State::IDLE, State::IDLE, Outcome::RELEASE),
-    row(Event::CLEAR, State::READY, State::IDLE, Outcome::RELEASE),
-    row(Event::CLEAR, State::HELD, State::IDLE, Outcome::RELEASE),
-    row(Event::CLEAR, State::STARVED, State::IDLE, Outcome::RELEASE),
     row(Event::CLEAR, State::FAULT, State::IDLE, Outcome::RELEASE),
+    row(Event::CLEAR_KEPT, State::IDLE, State::IDLE, Outcome::RELEASE),
+    row(Event::CLEAR_KEPT, State::READY, State::READY, Outcome::FORGET),
+    row(Event::CLEAR_KEPT, State::HELD, State::READY, Outcome::FORGET),
+    row(Event::CLEAR_KEPT, State::STARVED, State::READY, Outcome::FORGET),
+    row(Event::CLEAR_KEPT, State::FAULT, State::READY, Outcome::FORGET),
 
     row(Event::HOLD, State::RUNNING, State::HOLDING, Outcome::REST),
     row(Event::HOLD, State::STARVED, State::HOLDING, Outcome::REST),
@@ -108,10 +109,12 @@ void carry_out(Outcome outcome) {
         case Outcome::ENERGISE:
             return power::energise();
         case Outcome::RELEASE:
-            motion::halt();
+            power::release();
+            // fall through - the drivers are off, the fault is forgotten
+        case Outcome::FORGET:
             latched_fault = Fault::NONE;
             latched_detail = 0;
-            return power::release();
+            return motion::halt();
         case Outcome::DROP:
             home::cancel();
             return motion::halt();
@@ -137,6 +140,17 @@ State state() { return current_state; }
 Fault fault() { return latched_fault; }
 
 uint8_t fault_detail() { return latched_detail; }
+
+Event clear_event() {
+    switch (latched_fault) {
+        case Fault::EMERGENCY_STOP:
+        case Fault::STOP_INPUT:
+        case Fault::HOMING_FAILED:
+            return Event::CLEAR;
+        default:
+            return Event::CLEAR_KEPT;
+    }
+}
 
 bool allows(Event event) { return find(event) != 0; }
 

@@ -29,6 +29,8 @@ enum class Event : uint8_t {
     STARVED,
     FED,
     DONE,
+    // CLEAR where the position is known
+    CLEAR_KEPT,
 };
 
 enum class Outcome : uint8_t {
@@ -39,6 +41,7 @@ enum class Outcome : uint8_t {
     GO,            // the path clock goes on
     REST,          // it slows down to rest
     REST_QUICKLY,  // at once as the segments allow
+    FORGET,        // drops the motion and forgets the fault; the drivers stay as they are
 };
 
 // Idle, without a fault. For start-up.
@@ -47,6 +50,9 @@ void reset();
 wire::State state();
 wire::Fault fault();
 uint8_t fault_detail();
+
+// What a CLEAR is now: a fault that loses the position leaves nothing that the drivers could hold.
+Event clear_event();
 
 // True when the table has a row for the event in this state.
 bool allows(Event event);

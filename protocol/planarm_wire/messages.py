@@ -180,8 +180,9 @@ class MessageType(IntEnum):
     CLEAR = 6
     """From the host.
 
-    Clears a latched fault and the refusal, drops the queue and releases the drivers: fault, ready or idle to idle.
-    Position counters stay.
+    Clears a latched fault and the refusal and drops the queue. The drivers stay on where the position is known:
+    ready, held, starved and most faults to ready; after emergency_stop, stop_input and homing_failed they are
+    released, to idle; idle stays. Position counters stay.
     """
     RESUME = 7
     """From the host.
@@ -244,7 +245,7 @@ class State(IntEnum):
     FAULT = 3
     """Pulses stopped, first fault latched, drivers keep holding.
 
-    An emergency stop may release them. CLEAR leads to idle.
+    An emergency stop may release them. CLEAR leads to ready, or to idle where the position is lost.
     """
     HOLDING = 4
     """Slowing down along the path towards a hold."""
@@ -520,9 +521,10 @@ class Start:
 
 @dataclass(frozen=True, slots=True)
 class Clear:
-    """Clears a latched fault and the refusal, drops the queue and releases the drivers: fault, ready or idle to idle.
+    """Clears a latched fault and the refusal and drops the queue.
 
-    Position counters stay.
+    The drivers stay on where the position is known: ready, held, starved and most faults to ready; after
+    emergency_stop, stop_input and homing_failed they are released, to idle; idle stays. Position counters stay.
 
     From the host, payload 0 bytes.
     """

@@ -25,6 +25,8 @@ from planarm_wire.codec import encoded_bytes
 from planarm_wire.framing import encode_frame
 from planarm_wire.messages import (
     DELIMITER,
+    EMERGENCY_CODE,
+    EMERGENCY_REPEATS,
     ENABLE_PIN,
     MAX_SEGMENT_TICKS,
     MIN_LEAD_TICKS,
@@ -204,10 +206,10 @@ TABLE = {
         "release": State.IDLE,
         "segments": State.READY,
         "start": None,
-        "clear": State.IDLE,
+        "clear": State.READY,
     },
     State.RUNNING: {"enable": None, "release": None, "segments": State.RUNNING, "start": None, "clear": None},
-    State.FAULT: {"enable": None, "release": None, "segments": None, "start": None, "clear": State.IDLE},
+    State.FAULT: {"enable": None, "release": None, "segments": None, "start": None, "clear": State.READY},
 }
 
 
@@ -230,7 +232,11 @@ def test_enable_pin_follows_the_state(board: Board) -> None:
     board.ask(Enable(0))
     board.get_ready()
     board.ask(Segments(0, 0, 0, (segment_of(0),)))  # a fault keeps holding
-    board.ask(Clear())
+    assert board.ask(Clear()).state is State.READY
+    assert [edge.level for edge in board.edges] == [0, 1, 0], "the position is known: the drivers stay on"
+    board.receive(bytes([EMERGENCY_CODE] * EMERGENCY_REPEATS))
+    board.run(100_000)
+    assert board.ask(Clear()).state is State.IDLE
     assert [(edge.pin, edge.level) for edge in board.edges] == [(ENABLE_PIN, level) for level in (0, 1, 0, 1)]
 
 

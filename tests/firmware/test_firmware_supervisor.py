@@ -25,6 +25,7 @@ EVENTS = [
     "starved",
     "fed",
     "done",
+    "clear_kept",
 ]
 """In the order of supervisor::Event."""
 
@@ -33,7 +34,7 @@ TABLE: dict[State, dict[str, State]] = {
     S.IDLE: {
         "enable": S.READY,
         "release": S.IDLE,
-        "clear": S.IDLE,
+        "clear_kept": S.IDLE,
         "config": S.IDLE,
         "soft_limits": S.IDLE,
         "set_position": S.IDLE,
@@ -43,7 +44,7 @@ TABLE: dict[State, dict[str, State]] = {
         "release": S.IDLE,
         "segments": S.READY,
         "start": S.RUNNING,
-        "clear": S.IDLE,
+        "clear_kept": S.READY,
         "stop": S.READY,
         "quick_stop": S.READY,
         "soft_limits": S.READY,
@@ -69,7 +70,7 @@ TABLE: dict[State, dict[str, State]] = {
     S.HELD: {
         "release": S.IDLE,
         "segments": S.HELD,
-        "clear": S.IDLE,
+        "clear_kept": S.READY,
         "resume": S.RUNNING,
         "stop": S.READY,
         "quick_stop": S.READY,
@@ -77,7 +78,7 @@ TABLE: dict[State, dict[str, State]] = {
     S.STARVED: {
         "release": S.IDLE,
         "segments": S.STARVED,
-        "clear": S.IDLE,
+        "clear_kept": S.READY,
         "hold": S.HOLDING,
         "stop": S.READY,
         "quick_stop": S.READY,
@@ -85,7 +86,7 @@ TABLE: dict[State, dict[str, State]] = {
     },
     S.STOPPING: {"stop": S.STOPPING, "quick_stop": S.STOPPING, "at_rest": S.READY, "done": S.READY},
     S.HOMING: {"hold": S.READY, "stop": S.READY, "quick_stop": S.READY, "done": S.READY},
-    S.FAULT: {"clear": S.IDLE},
+    S.FAULT: {"clear": S.IDLE, "clear_kept": S.READY},
 }
 """docs/protocol.md, states and messages; what is not listed is refused and changes nothing."""
 

@@ -145,8 +145,11 @@ def _meet(transport: Transport, port: str, scene: Scene, positions: Positions) -
 
 def _make_ready(transport: Transport, session: Session, scene: Scene) -> None:
     """Tell the device of its motors and switches, and switch its drivers on."""
-    if request(transport, session, Query()).state is not State.IDLE:
-        request(transport, session, Clear())
+    status = request(transport, session, Query())
+    if status.state is not State.IDLE:
+        status = request(transport, session, Clear())
+    if status.state is State.READY:
+        request(transport, session, Enable(0))  # CONFIG is for released drivers
     told = config_of([start_stop_ticks(axis) for axis in motor_axes(scene.joints, scene.coupling)], scene.board)
     request(transport, session, replace(told, options=WATCH_SWITCHES))
     request(transport, session, Enable(1))
