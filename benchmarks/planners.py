@@ -4,7 +4,8 @@ The scene is case 1 of paper C's Table I with four discs and without a limit of 
 figures are medians of warm runs in this one process, in CPU time, since the machine may be busy: compare the ratios,
 not the milliseconds of one machine with those of another. Ours start from ready arrays of the map, as the peers do from
 a ready graph or cost array, and end with the path. All peers have 8 neighbours; scipy's dijkstra goes to every node:
-it cannot stop at a goal. "proved" is what proving moves costs: milliseconds with moves = "proved".
+it cannot stop at a goal. "proved" is what proving moves costs: milliseconds with moves = "proved", and how many times
+those with nodes checked; the two are timed by turns. A peer that does not run is told with its reason.
 """
 
 import argparse
@@ -12,6 +13,7 @@ import importlib.util
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from math import hypot, pi
+from pathlib import Path
 from statistics import median
 from time import process_time
 from typing import Any, Final, NamedTuple
@@ -20,11 +22,13 @@ import numpy as np
 from numpy.typing import NDArray
 from rich import box
 from rich.console import Console
+from rich.progress import track
 from rich.table import Table
 from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import dijkstra
 
 from planarm.experiments.scenes import table1_scene
+from planarm.report.style import JOINT_COLOURS, dress, new_figure, save
 from planarm.scene import Algorithm, Moves, PlannerSpec, Point, Scene
 from planarm.search.best_first import Rules, best_first
 from planarm.search.grid_search import FEW_MOVES, LEGAL, find_path
@@ -41,12 +45,22 @@ OURS: Final[tuple[tuple[str, Algorithm, int], ...]] = (
     ("Modified A* 24", "modified_a_star", 24),
     ("CHS 56", "chs", 56),
 )
+CHECKS: Final[tuple[Moves, Moves]] = ("nodes", "proved")
+GROWTH_CELLS_CM: Final = (1.0, 0.5, 0.25, 0.1, 0.05, 0.025)
+LEAST_COLUMNS: Final = 96
+"""Columns of the table: a narrow terminal breaks its lines rather than its figures."""
 BUDGET_S: Final = 0.3
 """CPU time for one median, unless one run takes longer."""
 LEAST_RUNS: Final = 3
 MOST_RUNS: Final = 31
 LONG_S: Final = 1.0
 """A run that takes longer is not repeated."""
+PEERS: Final = (
+    ("skimage MCP_Geometric", "skimage", "scikit-image"),
+    ("networkx A*", "networkx", "networkx"),
+    ("OMPL RRT*", "ompl", "ompl"),
+)
+"""Searches of others that are not among what planarm needs: name, module, package."""
 NETWORKX_NODES: Final = 400_000
 """networkx takes minutes to build a larger graph."""
 OMPL_S: Final = 1.0
@@ -67,8 +81,13 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else "")
     parser.add_argument("--cells", type=float, nargs="+", default=[1.0, 0.1], metavar="CM", help="default: 1 0.1")
     parser.add_argument("--every", action="store_true", help="every stencil, not three of them")
+    parser.add_argument("--growth", type=Path, metavar="PNG", help="only draw how times grow with cells and neighbours")
     options = parser.parse_args()
     console = Console()
+    console = console if console.width >= LEAST_COLUMNS else Console(width=LEAST_COLUMNS)
+    if options.growth:
+        draw_growth(options.growth)
+        return
     for cell_cm in options.cells:
         report(console, cell_cm, options.every)
 
@@ -87,12 +106,14 @@ def report(console: Console, cell_cm: float, every: bool) -> None:
     )
     table = Table(box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0), pad_edge=False)
     table.add_column("planner", no_wrap=True)
-    for name in ("pair 1: cm", "ms", "proved", "pair 2: cm", "ms", "proved"):
+    for name in ("pair 1: cm", "ms", "proved", "times", "pair 2: cm", "ms", "proved", "times"):
         table.add_column(name, justify="right", no_wrap=True)
     columns = [measured(Task(scene, free_map, *pair), every) for pair in PAIRS]
     for first, second in zip(*columns, strict=True):
         table.add_row(first[0], *first[1:], *second[1:])
     console.print(table)
+    for line in absent_peers(free_map):
+        console.print(line)
 
 
 def scene_at(cell_cm: float) -> Scene:
@@ -109,23 +130,24 @@ def megabytes(free_map: FreeMap) -> float:
     return (free_map.region.nbytes + free_map.whole.nbytes + nodes * (2 + BYTES_PER_NODE)) / 1e6
 
 
-Row = tuple[str, str, str, str]
+Row = tuple[str, str, str, str, str]
 
 
 def measured(task: Task, every: bool) -> list[Row]:
     """Time peers and ours on one pair; the best peer's time by ours ends the list."""
     peers = list(measure_peers(task))
-    rows = [(name, f"{length_cm:.4f}", digits(ms), "") for name, length_cm, ms in peers]
+    rows: list[Row] = [(name, f"{length_cm:.4f}", digits(ms), "", "") for name, length_cm, ms in peers]
     best_ms = min((ms for name, _, ms in peers if "OMPL" not in name), default=0.0)
     ratio = ""
     for name, algorithm, neighbours in stencils(every):
-        nodes_cm, nodes_ms = measure(task, PlannerSpec(algorithm, neighbours, "run", 1, "nodes"))
-        _, proved_ms = measure(task, PlannerSpec(algorithm, neighbours, "run", 1, "proved"))
-        rows.append((name, f"{nodes_cm:.4f}", digits(nodes_ms), digits(proved_ms)))
+        ways = [searching(task, PlannerSpec(algorithm, neighbours, "run", 1, moves)) for moves in CHECKS]
+        nodes_ms, proved_ms = medians_ms(ways[0].search, ways[1].search)
+        times = f"{proved_ms / nodes_ms:.2f}"
+        rows.append((name, f"{ways[0].length_cm:.4f}", digits(nodes_ms), digits(proved_ms), times))
         ratio = ratio or digits(best_ms / nodes_ms)
     taut_cm, taut_ms = measure_call(task, "taut", 56, "proved")
-    rows.append(("taut, whole call", f"{taut_cm:.4f}", "", digits(taut_ms)))
-    rows.append(("best peer / ours", "", ratio, ""))
+    rows.append(("taut, whole call", f"{taut_cm:.4f}", "", digits(taut_ms), ""))
+    rows.append(("best peer / ours", "", ratio, "", ""))
     return rows
 
 
@@ -140,8 +162,15 @@ def stencils(every: bool) -> Iterator[tuple[str, Algorithm, int]]:
             yield f"{name} {neighbours}", algorithm, neighbours
 
 
-def measure(task: Task, planner: PlannerSpec) -> tuple[float, float]:
-    """Return length and milliseconds of a search on ready arrays, once it is seen to be the one `find_path` runs."""
+class Searching(NamedTuple):
+    """A search on ready arrays, to be timed."""
+
+    search: Callable[[], object]
+    length_cm: float
+
+
+def searching(task: Task, planner: PlannerSpec) -> Searching:
+    """Return a search on ready arrays and its path's length, once it is seen to be the one `find_path` runs."""
     offsets = stencil(planner.algorithm, planner.neighbours)
     lattice = make_lattice(task.free_map, border=int(np.abs(offsets).max()))
     offsets = primitive(offsets) if planner.moves == "proved" else offsets
@@ -157,13 +186,15 @@ def measure(task: Task, planner: PlannerSpec) -> tuple[float, float]:
     length_cm = length_of(lattice, search())
     whole = find_path(task.free_map, task.start_cm, task.goal_cm, planner)
     assert whole.path is not None and abs(length_cm - whole.path.length_cm) < 1e-6, "the same path as find_path's"
-    return length_cm, median_ms(search)
+    return Searching(search, length_cm)
 
 
 def measure_call(task: Task, algorithm: Algorithm, neighbours: int, moves: Moves) -> tuple[float, float]:
     """Return length and milliseconds of `find_path` without its bound."""
     spec = PlannerSpec(algorithm, neighbours, "run", 1, moves)
-    results = [find_path(task.free_map, task.start_cm, task.goal_cm, spec) for _ in range(LEAST_RUNS)]
+    results = [find_path(task.free_map, task.start_cm, task.goal_cm, spec)]
+    runs = MOST_RUNS if results[0].plan_s < BUDGET_S / MOST_RUNS else LEAST_RUNS
+    results += [find_path(task.free_map, task.start_cm, task.goal_cm, spec) for _ in range(runs)]
     path = results[0].path
     assert path is not None, "there is a way"
     return path.length_cm, 1e3 * median(result.plan_s for result in results)
@@ -193,6 +224,15 @@ def measure_peers(task: Task) -> Iterator[tuple[str, float, float]]:
         yield "networkx A*", *networkx_a_star(graph, task.free_map, number, start, goal)
     if importlib.util.find_spec("ompl"):
         yield f"OMPL RRT*, {OMPL_S:g} s", *ompl_rrt_star(task)
+
+
+def absent_peers(free_map: FreeMap) -> Iterator[str]:
+    """Yield which peers were not run on a map, and why."""
+    for name, module, package in PEERS:
+        if not importlib.util.find_spec(module):
+            yield f"{name} was not run: {package} is not installed (pip install {package})."
+        elif module == "networkx" and free_map.free_nodes > NETWORKX_NODES:
+            yield f"{name} was not run: building its graph of {free_map.free_nodes} nodes takes minutes."
 
 
 def index_of(free_map: FreeMap, point_cm: Point) -> tuple[int, int]:
@@ -281,19 +321,63 @@ def digits(value: float) -> str:
 
 def median_ms(work: Callable[[], object]) -> float:
     """Return the median CPU time of some runs in milliseconds; the first is not counted unless it is a long one."""
+    return medians_ms(work)[0]
 
-    def once() -> float:
+
+def medians_ms(*works: Callable[[], object]) -> list[float]:
+    """Return `median_ms` of each; they run by turns, so that what else the machine does meets all alike."""
+
+    def once(work: Callable[[], object]) -> float:
         began_s = process_time()
         work()
         return process_time() - began_s
 
-    first_s = once()
-    if first_s > LONG_S:
-        return 1e3 * first_s
-    began_s, took_s = process_time(), list[float]()
-    while len(took_s) < LEAST_RUNS or (len(took_s) < MOST_RUNS and process_time() - began_s < BUDGET_S):
-        took_s.append(once())
-    return 1e3 * median(took_s)
+    firsts_s = [once(work) for work in works]
+    if max(firsts_s) > LONG_S:
+        return [1e3 * first_s for first_s in firsts_s]
+    began_s, took_s = process_time(), [list[float]() for _ in works]
+    rounds, budget_s = 0, len(works) * BUDGET_S
+    while rounds < LEAST_RUNS or (rounds < MOST_RUNS and process_time() - began_s < budget_s):
+        for work, times_s in zip(works, took_s, strict=True):
+            times_s.append(once(work))
+        rounds += 1
+    return [1e3 * median(times_s) for times_s in took_s]
+
+
+def draw_growth(target: Path) -> None:
+    """Time the first pair on ever finer cells, and with every stencil at 1 mm, and draw both."""
+    figure = new_figure(9.0, 3.8)
+    left, right = figure.subplots(1, 2)
+    lines: dict[str, list[float]] = {}
+    free = []
+    for cell_cm in track(GROWTH_CELLS_CM, "cells"):
+        task = Task(scene_at(cell_cm), build_free_map(scene_at(cell_cm), 0.0), *PAIRS[0])
+        free.append(task.free_map.free_nodes)
+        for name, _, ms in measure_peers(task):
+            if "OMPL" not in name:
+                lines.setdefault(name, []).append(ms)
+        for name, algorithm, neighbours in OURS[::2]:
+            for moves in CHECKS:
+                way = searching(task, PlannerSpec(algorithm, neighbours, "run", 1, moves))
+                lines.setdefault(f"{name}, {moves}", []).append(median_ms(way.search))
+    for k, (name, times_ms) in enumerate(lines.items()):
+        ours, colour = "," in name, JOINT_COLOURS[k % len(JOINT_COLOURS)]
+        left.loglog(free[: len(times_ms)], times_ms, "o-" if ours else "s--", color=colour, markersize=4, label=name)
+    task = Task(scene_at(0.1), build_free_map(scene_at(0.1), 0.0), *PAIRS[0])
+    for k, moves in enumerate(CHECKS):
+        points = []
+        for _, algorithm, neighbours in track(list(stencils(every=True)), f"neighbours, {moves}"):
+            way = searching(task, PlannerSpec(algorithm, neighbours, "run", 1, moves))
+            points.append((neighbours, median_ms(way.search)))
+        right.plot(*zip(*sorted(points), strict=True), "o-", color=JOINT_COLOURS[k], label=moves)
+    left.set_xlabel("free nodes of the map")
+    left.set_ylabel("ms of CPU")
+    right.set_xlabel("neighbours, cells of 1 mm")
+    right.set_ylim(bottom=0.0)
+    for axes in (left, right):
+        dress(axes)
+        axes.legend(frameon=False, fontsize=7)
+    save(figure, target)
 
 
 if __name__ == "__main__":

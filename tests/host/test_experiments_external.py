@@ -120,7 +120,15 @@ def test_a_planner_that_dies_or_is_late_leaves_no_answers():
     late = score_external(f'{sys.executable} -c "import time; time.sleep(60)"', 2, 0.2)
     for score in (dead, late):
         assert [one.verdict for one in score.answers] == ["no answer", "no answer"]
-        assert score.fields()["optimal"] == 0
+        assert score.fields()["optimal"] == 0 and score.silent
+
+
+def test_a_planner_without_any_answer_is_an_error_not_a_score(capsys):
+    with pytest.raises(SystemExit) as left:
+        main(["compare", "--external", f"{sys.executable} -c pass", "--scenes", "2", "--json"])
+    told = json.loads(capsys.readouterr().out)
+    assert left.value.code == 2
+    assert "answered none of 2 scenes" in told["error"]["message"] and "--timeout-s" in told["error"]["message"]
 
 
 def test_a_problem_says_all_that_docs_name():

@@ -131,11 +131,14 @@ def test_where_the_optimum_is_not_known_the_answer_says_so():
     exact = planner("any_angle", 56, moves="proved")
     scene = table1_scene(1)
     free_map = build_free_map(scene)
-    assert find_path(free_map, (49.0, 2.0), (1.0, 45.0), exact).note == ""
+    optimum = find_path(free_map, (49.0, 2.0), (1.0, 45.0), exact)
+    assert (optimum.note, optimum.gap, optimum.bound_cm) == ("", 0.0, optimum.path.length_cm)
     assert "no node" in find_path(free_map, (48.9, 2.3), (1.0, 45.0), exact).note
     assert "CHS" in find_path(free_map, (49.0, 2.0), (1.0, 45.0), planner("any_angle", 56, moves="nodes")).note
     fine = build_free_map(replace(scene, workspace=replace(scene.workspace, cell_cm=0.1)))
     found = find_path(fine, (49.0, 2.0), (1.0, 45.0), exact)
     assert "20,000 nodes" in found.note
+    assert f"No path is shorter than {found.bound_cm:.4f} cm" in found.note
+    assert f"at most {found.gap:.2%} longer" in found.note and 0.0 < found.gap < 0.02
     assert "workspace.cell_cm" in found.note
     assert found.gap > 0.0

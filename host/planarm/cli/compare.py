@@ -43,11 +43,21 @@ def execute(options: argparse.Namespace) -> int:
 
 
 def _external(options: argparse.Namespace) -> int:
-    """Score anybody's planner on the open benchmark."""
+    """Score anybody's planner on the open benchmark.
+
+    Raises:
+        UsageError: It gave no answer to any scene.
+    """
     from planarm.experiments.external import score_external, score_table
 
     with progress(options.json) as notice:
         score = score_external(options.external, options.scenes or BENCHMARK_SCENES, options.timeout_s, notice)
+    if score.silent:
+        raise UsageError(
+            f"--external: {options.external!r} answered none of {len(score.answers)} scenes: it ended, or took longer "
+            f"than --timeout-s {options.timeout_s:g}; it has to read a scene a line from stdin and to write an answer "
+            "a line to stdout, unbuffered (docs/benchmark.md)"
+        )
     if options.json:
         print(json.dumps(score.fields()))
     else:

@@ -34,6 +34,7 @@ from planarm.workspace.free_map import FreeMap
 Floats = NDArray[np.float64]
 
 DATA: Final = "open_benchmark.csv"
+NO_ANSWER: Final = "no answer"
 ON_NODE_CM: Final = 1e-6
 """A way-point this near to a node is the node."""
 
@@ -69,6 +70,11 @@ class Score:
 
     command: str
     answers: tuple[Answer, ...]
+
+    @property
+    def silent(self) -> bool:
+        """Whether no scene was answered at all: then there is nothing to score."""
+        return all(one.verdict == NO_ANSWER for one in self.answers)
 
     def fields(self) -> dict[str, Any]:
         """Return the figures for JSON: how many are solved, their gaps and times, what is wrong with the others."""
@@ -136,7 +142,7 @@ def judge(told: str, scene: Scene, free_map: FreeMap) -> tuple[str, float | None
             return "no path", None
         array = np.array(points, np.float64)
     except (ValueError, TypeError, KeyError):
-        return ("no answer" if not told else "not as docs/benchmark.md says"), None
+        return (NO_ANSWER if not told else "not as docs/benchmark.md says"), None
     if array.ndim != 2 or array.shape[1] != 2 or len(array) < 2 or not np.isfinite(array).all():
         return "not as docs/benchmark.md says", None
     nodes = np.round(array / free_map.cell_cm) * free_map.cell_cm

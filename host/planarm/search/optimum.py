@@ -46,7 +46,7 @@ MOST_NODES: Final = 3000
 """Between more nodes than these the optimum is not looked for to bound a path."""
 
 MOST_ASKED: Final = 20_000
-"""Nor between more than these when it is asked for: that may take seconds."""
+"""Nor between more than these when it is asked for: that may take two minutes."""
 
 
 def excess() -> float:

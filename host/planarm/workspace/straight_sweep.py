@@ -14,6 +14,9 @@ the turn. Then
 - every point of link 2 lies between elbow and tip, so link 2 stays in the convex hull of the arc and the tip's way. The
   arc leaves its chord by at most l1 t (1 + t) / 2 with t = (chord / 2 l1)^2, as 1 - sqrt(1 - t) is no more than that;
 - no point moves farther from its place at the piece's beginning than the longest of these chords and the tip's way.
+
+What is shown holds for exact poses; those of the kernels are rounded, by less than ROUNDING_CM but near singular poses,
+where they, and so what is shown, are true to some 1e-6 cm.
 """
 
 from math import sqrt
