@@ -238,6 +238,8 @@ void Motion::prepare() {
 // Takes executed slices off the list. True when the last of them ended what was received.
 bool Motion::retire(bool& ends_motion) {
     while (prepared_count != 0 && clock::has_come(prepared[0].end_ticks)) {
+        // The last steps of joints 3 and 4 may rise some hundred ticks after their own.
+        if (prepared_count == 1 && !step_engine::is_idle()) return false;
         if (prepared[0].ends_segment) ++executed_segments;
         ends_motion = prepared[0].ends_motion;
         --prepared_count;

@@ -195,6 +195,13 @@ bool has_room(uint8_t joint) {
     return ring.free->next != ring.oldest;
 }
 
+bool is_idle() {
+    for (uint8_t joint = 0; joint < wire::JOINTS; ++joint) {
+        if (active_run(joint) != rings[joint].free) return false;
+    }
+    return true;
+}
+
 Run& next_run(uint8_t joint) { return *rings[joint].free; }
 
 void append(uint8_t joint, bool near) {

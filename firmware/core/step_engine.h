@@ -64,6 +64,9 @@ void reset();
 // True while `joint` can take another run. Takes executed ones back.
 bool has_room(uint8_t joint);
 
+// True when all runs are executed.
+bool is_idle();
+
 // The run to be appended next, to be filled: all but `next`, `chained` and `dir_high`; has_room must hold.
 Run& next_run(uint8_t joint);
 
