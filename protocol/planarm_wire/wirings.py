@@ -15,6 +15,9 @@ def board_of(joints: int, pin_map: str = OWN) -> Board:
     Raises WireError when no board of this wiring steps so many.
     """
     wired = [board for board in BOARDS.values() if board.pin_map == pin_map]
+    if not wired:
+        known = ", ".join(dict.fromkeys(board.pin_map for board in BOARDS.values()))
+        raise WireError(f"no wiring {pin_map!r} is known; there are {known}")
     fitting = [board for board in wired if board.joints >= joints]
     if not fitting:
         most = max(board.joints for board in wired)

@@ -18,7 +18,7 @@ from planarm.link.sim_transport import SimTransport
 from planarm.operations.arm_moves import goto, jog
 from planarm.plan_file import arm_hash
 from planarm.scene import load_scene
-from planarm.streaming.standing import look, pose_of, require_standing, start_usteps, tell, usteps_at
+from planarm.streaming.standing import look, pose_of, require_standing, settle_start, start_usteps, tell, usteps_at
 from planarm_wire.messages import Enable, Segments
 
 PORT = "/dev/ttyUNO"
@@ -196,3 +196,30 @@ def test_a_scene_on_sim_is_asked_on_its_own_board(tmp_path, capsys, monkeypatch)
             main(["status", str(examples / f"{name}.toml"), "--port", "sim://", "--json"])
         assert not end.value.code
         assert json.loads(capsys.readouterr().out)["usteps"] == zeros
+
+
+@pytest.mark.parametrize("image", ["uno", "cnc_shield"])
+def test_the_wiring_of_a_board_whose_drivers_are_on_is_told_by_its_answer_to_config(image, positions):
+    scene = scene_of(2)
+    line = SimTransport(released_image(image), board=scene.board)
+    request(line, open_session(line), Enable(1))
+    if image == "uno":
+        tell(line, PORT, scene, positions, start_usteps(scene), "zeroed")
+        assert look(line, PORT, scene, positions).usteps == start_usteps(scene)
+        return
+    with pytest.raises(LinkError, match=r"not for the wiring 'own' of the plan: flash its image.*--board uno "):
+        look(line, PORT, scene, positions)
+    with pytest.raises(LinkError, match="not for the wiring 'own'"):
+        settle_start(RealPins(line), PORT, scene, start_usteps(scene), positions, vouched=True)
+
+
+class RealPins:
+    """A line whose pins nobody sees, as a real board's."""
+
+    pins = None
+
+    def __init__(self, line):
+        self._line = line
+
+    def __getattr__(self, name):
+        return getattr(self._line, name)

@@ -1,6 +1,7 @@
 """Arms of one to four links on every wiring, from scene to report on the emulated board and its arm."""
 
 from dataclasses import replace
+from itertools import pairwise
 from math import radians
 
 import numpy as np
@@ -14,7 +15,7 @@ from planarm.link.released_image import released_image
 from planarm.link.sim_transport import SimTransport
 from planarm.pipeline import plan_scene, run_scene
 from planarm.plan_file import load_plan
-from planarm_wire.messages import BOARDS, TICKS_HZ
+from planarm_wire.messages import BOARDS, MIN_DIR_SETUP_TICKS, TICKS_HZ
 from planarm_wire.steps import duration_ticks
 
 CASES = [(joints, wiring) for wiring in ("own", "cnc_shield") for joints in (1, 2, 3, 4)]
@@ -27,7 +28,7 @@ def no_notice(_stage, _share):
 
 
 def read_back(path):
-    """The motors' positions after each tick with a step, from the file's bytes alone: whole numbers, one by one."""
+    """The motors' positions after each step, and the steps (tick, motor, sense): from the file's numbers."""
     plan = load_plan(path).segments
     at, events = 0, []
     for segment in plan.segments:
@@ -40,7 +41,7 @@ def read_back(path):
     for _, motor, sign in sorted(events):
         position[motor] += sign
         rows.append(list(position))
-    return np.array(rows)
+    return np.array(rows), sorted(events)
 
 
 def tips_and_links(scene, usteps):
@@ -76,14 +77,19 @@ def test_a_scene_runs_on_its_board(joints, wiring, tmp_path):
 def test_the_bytes_of_a_plan_keep_the_arm_free_by_another_geometry(joints, wiring, tmp_path):
     scene = scene_of(joints, wiring)
     run_scene(scene, "sim://", tmp_path, no_notice)
-    usteps = read_back(tmp_path / "run.plan")
+    usteps, steps = read_back(tmp_path / "run.plan")
     tips, links = tips_and_links(scene, usteps)
     goal = np.exp(1j * np.cumsum([radians(angle) for angle in GOAL[:joints]])) @ np.array(LENGTHS[:joints])
     assert abs(tips[-1] - goal) < 0.1
     obstacles = [shapely.Polygon(one.vertices_cm) for one in scene.obstacles]
     assert min(shapely.distance(links, shape).min() for shape in obstacles) >= 0.5 * scene.arm.link_width_cm
-    steps = np.abs(np.diff(usteps, axis=0))
-    assert (steps.sum(axis=1) == 1).all()
+    board, moved = scene.board, {motor for _, motor, _ in steps}
+    assert moved == set(range(joints))
+    for motor in moved:
+        own = [(tick, sign) for tick, of, sign in steps if of == motor]
+        assert own[0][0] >= MIN_DIR_SETUP_TICKS
+        for (before, one), (after, other) in pairwise(own):
+            assert after - before >= board.min_interval_ticks + (MIN_DIR_SETUP_TICKS if one != other else 0)
 
 
 @pytest.mark.parametrize(("joints", "wiring"), [(2, "cnc_shield"), (3, "own"), (4, "cnc_shield")])

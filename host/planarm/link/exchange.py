@@ -15,7 +15,9 @@ from planarm.link.margin import Margin
 from planarm.link.position import Known, Meeting, PositionReport, StreamError, StreamFault, judge
 from planarm.link.session import Session, SessionLimits, fault_words
 from planarm.link.stream import PERCENT, Joining, Phase, Stream, StreamOptions, StreamProgress
+from planarm.link.stream_values import config_of
 from planarm.link.transport import Transport
+from planarm_wire.boards import Board
 from planarm_wire.messages import Fault, HostMessage, Ledger, Query, Segment, State, Status
 
 _READ_BYTES = 4096
@@ -138,6 +140,26 @@ def request(transport: Transport, session: Session, message: HostMessage) -> Sta
     _drive(transport, session, lambda: session.idle)
     assert session.status is not None, "an acknowledgement is a status"
     return session.status
+
+
+def open_on_board(transport: Transport, board: Board) -> tuple[Session, Status]:
+    """Open a session with a device that is known to be such a board, and ask for its status.
+
+    Its joints are told by WELCOME, its wiring by its answer to CONFIG: whatever its state, an image of another wiring
+    refuses that as out of range. A device at ease takes it; it is told by the next motion and not asked before.
+
+    Raises LinkError when it is another board, or does not answer.
+    """
+    session = open_session(transport)
+    session.require_board(board)
+    status = request(transport, session, Query())
+    if status.state is State.IDLE:
+        return session, status
+    session.ask_wiring()
+    request(transport, session, config_of((), board))
+    session = open_session(transport)  # a refusal is told until the next HELLO
+    session.require_board(board)
+    return session, request(transport, session, Query())
 
 
 def _new_session(transport: Transport, limits: SessionLimits | None) -> Session:

@@ -89,6 +89,7 @@ class Session:
         self.bytes_sent = 0
         self.guarded = False
         self._board: Board | None = None
+        self._asking_wiring = False
         self._arq = GoBackN(next_seq=_HELLO_SEQ + 1)
         self._decoder = FrameDecoder()
         self._output = bytearray()
@@ -243,6 +244,10 @@ class Session:
         """The device's joints; those of the usual board until it has told."""
         return JOINTS if self.welcome is None else self.welcome.joints
 
+    def ask_wiring(self) -> None:
+        """Take the answer "wrong state" to CONFIG for what it says: the wiring is right, which is looked at first."""
+        self._asking_wiring = True
+
     def require_board(self, board: Board) -> None:
         """Check that the device is such a board, as far as it tells; its answer to CONFIG tells the rest.
 
@@ -317,6 +322,8 @@ class Session:
         if status.refusal != Result.OK:
             name = self._names.get(status.refusal_seq, "a frame")
             words = RESULT_WORDS[status.refusal]
+            if name == "CONFIG" and status.refusal is Result.WRONG_STATE and self._asking_wiring:
+                return
             if name == "CONFIG" and status.refusal is Result.OUT_OF_RANGE and self._board is not None:
                 raise LinkError(
                     f"the device's image is not for the wiring {self._board.pin_map!r} of the plan:"

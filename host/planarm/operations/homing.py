@@ -13,7 +13,7 @@ from dataclasses import asdict, dataclass, replace
 import numpy as np
 
 from planarm.errors import DeviceFault, LinkError, SceneError
-from planarm.link.exchange import open_session, request
+from planarm.link.exchange import open_on_board, request
 from planarm.link.positions import Positions
 from planarm.link.session import Session, fault_words
 from planarm.link.stream_values import config_of, position_of
@@ -137,8 +137,7 @@ def _meet(transport: Transport, port: str, scene: Scene, positions: Positions) -
             if missing
             else "homing is for motors that each move one joint; tell the place: 'planarm zero SCENE'",
         )
-    session = open_session(transport)
-    session.require_board(scene.board)
+    session, _ = open_on_board(transport, scene.board)
     assert session.welcome is not None, "an open session has a welcome"
     return session, positions.how(port, session.welcome.boot_nonce, arm_hash(asdict(scene)))
 

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from planarm.errors import LinkError, UsageError
-from planarm.link.exchange import open_session, request
+from planarm.link.exchange import open_on_board, open_session, request
 from planarm.link.positions import Positions
 from planarm.link.session import Session
 from planarm.link.stream_values import position_of
@@ -22,7 +22,7 @@ from planarm.model.kinematics import forward, inverse_2r
 from planarm.model.transmission import Transmission
 from planarm.plan_file import arm_hash
 from planarm.scene import Scene
-from planarm_wire.messages import QUEUE_FRAME_BYTES, Clear, Query, State
+from planarm_wire.messages import QUEUE_FRAME_BYTES, Clear, State
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,9 +47,7 @@ def look(transport: Transport, port: str, scene: Scene, positions: Positions) ->
         LinkError: it does not answer, or is not the scene's board.
         DeviceFault: it refuses.
     """
-    session = open_session(transport)
-    session.require_board(scene.board)
-    status = request(transport, session, Query())
+    session, status = open_on_board(transport, scene.board)
     assert session.welcome is not None, "an open session has a welcome"
     how = positions.how(port, session.welcome.boot_nonce, arm_hash(asdict(scene)))
     return Standing(session, status.ledger.position_usteps[: len(scene.joints)], how)
@@ -65,9 +63,7 @@ def tell(
     Raises:
         LinkError, DeviceFault: it does not take it.
     """
-    session = open_session(transport)
-    session.require_board(scene.board)
-    status = request(transport, session, Query())
+    session, status = open_on_board(transport, scene.board)
     left_behind = status.state is State.READY and status.free_bytes < scene.board.queue_bytes - QUEUE_FRAME_BYTES
     if left_behind or status.state is State.FAULT:
         request(transport, session, Clear())
