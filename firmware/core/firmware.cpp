@@ -49,13 +49,16 @@ void fail(wire::Fault fault, uint8_t detail = 0) {
     session::announce();
 }
 
+// The first fault stays, but its drivers, too, are released by an emergency stop.
 void serve_emergency() {
-    if (supervisor::state() == wire::State::FAULT) return;
     const bool open =
         settings::has_option(settings::STOP_INPUT) && (hal::inputs() & hal::STOP_INPUT_OPEN) != 0;
     const hal::Emergency emergency = hal::emergency();
     if (emergency == hal::Emergency::NONE && !open) return;
-    fail(emergency == hal::Emergency::LINE ? wire::Fault::EMERGENCY_STOP : wire::Fault::STOP_INPUT);
+    if (supervisor::state() != wire::State::FAULT) {
+        fail(emergency == hal::Emergency::LINE ? wire::Fault::EMERGENCY_STOP : wire::Fault::STOP_INPUT);
+    }
+    hal::emergency_latched();
     if (settings::has_option(settings::EMERGENCY_RELEASES)) power::release();
 }
 

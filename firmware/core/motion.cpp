@@ -328,8 +328,8 @@ uint8_t Motion::rate_percent() const {
 
 Progress Motion::serve() {
     if (!running) return Progress::GOING;
-    begun = begun || clock::has_come(begin_ticks);
     if (frozen) return serve_frozen();
+    begun = begun || clock::has_come(begin_ticks);
     if (!step_engine::serve()) return Progress::MISSED;
     prepare();
     bool ends_motion = false;

@@ -94,6 +94,7 @@ void send_status(const session::Report& report) {
     told.mcu_ticks = motion::tell_ledger(told.ledger);
     told.state = supervisor::state();
     told.fault = supervisor::fault();
+    hal::emergency_told();
     told.detail = supervisor::fault_detail();
     told.refusal = report.refusal;
     told.refusal_seq = report.refusal_seq;

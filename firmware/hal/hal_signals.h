@@ -12,6 +12,10 @@ enum class Emergency : uint8_t { NONE, LINE, INPUT };
 
 // What ended all pulses; until `emergency_clear` no step is made.
 Emergency emergency();
+// Three steps, so that none is cleared that the host has not been told of: the fault is latched, a STATUS
+// tells it, CLEAR takes it back. What comes in between goes on to be told by `emergency`.
+void emergency_latched();
+void emergency_told();
 void emergency_clear();
 
 // Restarts the count of 250 ms after which a main program that stands still is reset.

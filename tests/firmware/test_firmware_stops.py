@@ -344,3 +344,30 @@ def test_drivers_that_woke_long_ago_do_not_hold_up_the_next_start(native_firmwar
     board.send(Start(LEAD_TICKS))
     board.run(LEAD_TICKS + 400_000)
     assert len(board.rises(0)) == 10
+
+
+@pytest.mark.parametrize("queries", [0, 1, 3])
+@pytest.mark.parametrize("gap_bytes", [0, 1, 2, 3])
+def test_an_emergency_stop_behind_a_clear_is_kept(
+    emulated_firmware: EmulatedFirmware, queries: int, gap_bytes: int
+) -> None:
+    board = configured(emulated_firmware)
+    board.receive(bytes([EMERGENCY_CODE] * EMERGENCY_REPEATS))
+    board.run(100_000)
+    assert board.ask().fault is Fault.EMERGENCY_STOP
+    for message in (*[Query()] * queries, Clear()):
+        board.send(message)
+    board.run(gap_bytes * BYTE_TICKS)
+    board.receive(bytes([EMERGENCY_CODE] * EMERGENCY_REPEATS))
+    board.run(100_000)
+    assert board.ask(Enable(1)).fault is Fault.EMERGENCY_STOP
+
+
+def test_an_emergency_stop_releases_the_drivers_of_another_fault_too(firmware: Firmware) -> None:
+    board = configured(firmware, options=RELEASES)
+    assert board.ask(Segments(0, 0, 0, (segment_of(0, run_of(1)),))).fault is Fault.BAD_SEGMENT
+    assert not [edge for edge in board.edges if edge.pin == ENABLE_PIN][-1].level, "on: active low"
+    board.receive(bytes([EMERGENCY_CODE] * EMERGENCY_REPEATS))
+    board.run(100_000)
+    assert board.ask().fault is Fault.BAD_SEGMENT
+    assert [edge for edge in board.edges if edge.pin == ENABLE_PIN][-1].level

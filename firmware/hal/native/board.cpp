@@ -50,7 +50,11 @@ struct Board {
     uint8_t ring_full;
     uint8_t holds;
     uint8_t emergency_run;
-    Emergency emergency;
+    uint8_t emergencies;
+    uint8_t emergencies_latched;
+    uint8_t emergencies_told;
+    uint8_t emergencies_cleared;
+    Emergency emergency_cause;
     uint8_t inputs;
     bool stop_watched;
     bool enable_active_high;
@@ -189,12 +193,15 @@ void journal_serve() {}
 
 uint8_t hold_count() { return uno.holds; }
 
-Emergency emergency() { return uno.emergency; }
-
-void emergency_clear() {
-    uno.emergency_run = 0;
-    uno.emergency = Emergency::NONE;
+Emergency emergency() {
+    return uno.emergencies == uno.emergencies_cleared ? Emergency::NONE : uno.emergency_cause;
 }
+
+void emergency_latched() { uno.emergencies_latched = uno.emergencies; }
+
+void emergency_told() { uno.emergencies_told = uno.emergencies_latched; }
+
+void emergency_clear() { uno.emergencies_cleared = uno.emergencies_told; }
 
 void watchdog_feed() {}
 
@@ -243,7 +250,8 @@ namespace {
 void end_pulses(hal::Emergency cause) {
     hal::steps_off();
     planarm::for_each_joint([](auto joint) { hal::step_fall<joint.NUMBER>(); });
-    uno.emergency = cause;
+    ++uno.emergencies;
+    uno.emergency_cause = cause;
 }
 
 // What the receive interrupt does with a byte.

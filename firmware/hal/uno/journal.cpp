@@ -21,8 +21,6 @@ uint32_t sequence;
 uint8_t slot;  // of the newest record
 uint8_t record[RECORD_BYTES];
 uint8_t unwritten;  // bytes of the newest record
-bool pending;       // a mark waits for the record before it
-bool pending_enabled;
 
 bool is_ready() { return (EECR & _BV(EEPE)) == 0; }
 
@@ -79,9 +77,12 @@ bool find_newest() {
     return was_enabled;
 }
 
+// A record that is still being written is written anew in its place: a mark never waits for another.
 void begin_record(bool enabled) {
-    sequence = (sequence + 1) & SEQUENCE_MASK;
-    slot = static_cast<uint8_t>((slot + 1) % RECORDS);
+    if (unwritten == 0) {
+        sequence = (sequence + 1) & SEQUENCE_MASK;
+        slot = static_cast<uint8_t>((slot + 1) % RECORDS);
+    }
     record[0] = static_cast<uint8_t>(sequence);
     record[1] = static_cast<uint8_t>(sequence >> 8);
     record[2] = static_cast<uint8_t>((sequence >> 16) | (enabled ? 0x80 : 0));
@@ -100,20 +101,12 @@ JournalBoot journal_boot() {
     return {sequence, was_enabled};
 }
 
-void journal_mark(bool enabled) {
-    pending = true;
-    pending_enabled = enabled;
-}
+void journal_mark(bool enabled) { begin_record(enabled); }
 
 void journal_serve() {
-    if (!is_ready()) return;
-    if (unwritten != 0) {
-        --unwritten;
-        write_byte(static_cast<uint16_t>(slot * RECORD_BYTES + unwritten), record[unwritten]);
-    } else if (pending) {
-        pending = false;
-        begin_record(pending_enabled);
-    }
+    if (unwritten == 0 || !is_ready()) return;
+    --unwritten;
+    write_byte(static_cast<uint16_t>(slot * RECORD_BYTES + unwritten), record[unwritten]);
 }
 
 void keep_enable_polarity(bool active_high) {

@@ -58,13 +58,22 @@ void early_pins() {
     WDTCSR = 0;
 }
 
-int main() {
+namespace {
+
+// Apart from main, whose frame on the stack lies below all others.
+[[gnu::noinline]] void start() {
     const planarm::wire::Reset cause = hal::find_reset_cause();
     const hal::JournalBoot journal = hal::journal_boot();
     hal::step_timer_init();
     planarm::firmware::set_up({journal.count, cause, journal.was_enabled}, 0);
     hal::serial_init();
     hal::watchdog_start();
+}
+
+}  // namespace
+
+int main() {
+    start();
     sei();
     for (;;) planarm::firmware::pass();
 }

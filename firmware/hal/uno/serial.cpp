@@ -31,7 +31,11 @@ uint8_t ring[RX_RING_BYTES];  // written by the interrupt
 volatile uint8_t ring_full;
 
 volatile uint8_t holds;
-volatile uint8_t emergency_seen;
+volatile uint8_t emergencies;  // so far, modulo 256, as the next three
+volatile Emergency emergency_cause;
+uint8_t emergencies_latched;
+uint8_t emergencies_told;
+uint8_t emergencies_cleared;
 
 const uint8_t* volatile sending;
 volatile uint8_t sending_left;
@@ -75,12 +79,13 @@ uint8_t serial_ring_full() { return ring_full; }
 
 uint8_t hold_count() { return holds; }
 
-Emergency emergency() { return static_cast<Emergency>(emergency_seen); }
+Emergency emergency() { return emergencies == emergencies_cleared ? Emergency::NONE : emergency_cause; }
 
-void emergency_clear() {
-    EMERGENCY_RUN = 0;
-    emergency_seen = static_cast<uint8_t>(Emergency::NONE);
-}
+void emergency_latched() { emergencies_latched = emergencies; }
+
+void emergency_told() { emergencies_told = emergencies_latched; }
+
+void emergency_clear() { emergencies_cleared = emergencies_told; }
 
 }  // namespace hal
 
@@ -164,8 +169,11 @@ ISR(USART_RX_vect, ISR_NAKED) {
         sts  %[scheduled_on], r30
         sts  %[timsk2], r30
         .endif
+        lds  r30, %[emergencies]
+        inc  r30
+        sts  %[emergencies], r30
         ldi  r30, %[line]
-        sts  %[emergency], r30
+        sts  %[cause], r30
         movw r30, r4
         out  %[sreg], r2
         reti
@@ -177,8 +185,9 @@ ISR(USART_RX_vect, ISR_NAKED) {
         [repeats] "M"(planarm::wire::EMERGENCY_REPEATS), [all_disarmed] "i"(hal::ALL_DISARMED),
         [all_forced] "M"(_BV(FOC1A) | _BV(FOC1B)), [tccra] "i"(&TCCR1A), [tccrc] "i"(&TCCR1C),
         [timsk] "i"(&TIMSK1), [only_laps] "M"(hal::ONLY_LAPS),
-        [line] "M"(static_cast<uint8_t>(hal::Emergency::LINE)), [emergency] "i"(&hal::emergency_seen),
-        [joints] "n"(planarm::wire::JOINTS), [scheduled_on] "i"(&hal::scheduled_on), [timsk2] "i"(&TIMSK2));
+        [line] "M"(static_cast<uint8_t>(hal::Emergency::LINE)), [emergencies] "i"(&hal::emergencies),
+        [cause] "i"(&hal::emergency_cause), [joints] "n"(planarm::wire::JOINTS),
+        [scheduled_on] "i"(&hal::scheduled_on), [timsk2] "i"(&TIMSK2));
 }
 
 // The stop input's contact opened: what the last emergency byte does.
@@ -186,7 +195,8 @@ ISR(PCINT1_vect) {
     if (!hal::read_pin(planarm::wire::STOP_PIN)) return;
     hal::steps_off();
     TCCR1C = _BV(FOC1A) | _BV(FOC1B);
-    hal::emergency_seen = static_cast<uint8_t>(hal::Emergency::INPUT);
+    hal::emergencies = static_cast<uint8_t>(hal::emergencies + 1);
+    hal::emergency_cause = hal::Emergency::INPUT;
 }
 
 // 34 cycles with entry and jump, 36 after the last byte; once every 640.
