@@ -51,7 +51,7 @@ from planarm.stepping.schedule import encode, schedule
 from planarm.stepping.segments import SegmentPlan, expand
 from planarm.stepping.slowing import SpeedLimit, road_ticks
 from planarm.streaming.moving_run import KeptTime, Timekeeper, stream_on_time
-from planarm.streaming.plan_stream import options_for, record, stream, warn_of_release
+from planarm.streaming.plan_stream import options_for, record, stream, telling, warn_of_release
 from planarm.streaming.standing import settle_start
 from planarm.trajectory.binding import TimingReport, report_timing
 from planarm.trajectory.limits import Limits
@@ -382,17 +382,6 @@ def look_at(plan: Plan, transport: Transport, settle_s: float, kept: KeptTime | 
     arm = judge_emulated_arm(plan, findings, transport.arm, kept) if transport.arm else None
     planned = [joint.ticks for joint in expand(plan.segments).steps]
     return Seen(transport.pins, findings, arm, start_tick_of(planned, [joint.ticks for joint in findings.measured]))
-
-
-def telling(notice: Notice, *watchers: Callable[[StreamProgress], None]) -> Callable[[StreamProgress], None]:
-    """Return what tells a stream's progress as the share of its path time, and all of it to the watchers."""
-
-    def tell(told: StreamProgress) -> None:
-        notice("stream", told.path_s / told.total_s)
-        for watch in watchers:
-            watch(told)
-
-    return tell
 
 
 def judge_on_time(kept: KeptTime, trace: ArmTrace) -> ArmFindings:

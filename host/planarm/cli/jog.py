@@ -16,7 +16,7 @@ def execute(options: argparse.Namespace) -> int:
     tell_first_compile("planarm", "planarm_sim")
     from planarm.link.position import moved_usteps
     from planarm.operations.arm_moves import jog
-    from planarm.pipeline import telling
+    from planarm.streaming.plan_stream import telling
     from planarm.streaming.standing import look
 
     with progress(options.json) as notice, reached(options) as arm:

@@ -24,8 +24,8 @@ def execute(options: argparse.Namespace) -> int:
     from planarm.link.positions import Positions, default_path
     from planarm.link.transport import open_transport
     from planarm.operations.resume import go_on, load_run, meet_again
-    from planarm.pipeline import telling
     from planarm.plan_file import arm_hash
+    from planarm.streaming.plan_stream import telling
 
     run = load_run(Path(options.run))
     port = options.port or run.port

@@ -19,12 +19,11 @@ def execute(options: argparse.Namespace) -> int:
     from planarm.link.position import moved_usteps
     from planarm.link.positions import Positions, default_path
     from planarm.link.transport import open_transport
-    from planarm.pipeline import telling
     from planarm.plan_file import load_plan, require_arm
     from planarm.run_folder.folder import begin_run_folder
     from planarm.scene import load_scene
     from planarm.scene.rebuild import scene_from_mapping
-    from planarm.streaming.plan_stream import options_for, record, stream, warn_of_release
+    from planarm.streaming.plan_stream import options_for, record, stream, telling, warn_of_release
     from planarm.streaming.standing import settle_start
 
     plan = load_plan(Path(options.plan))

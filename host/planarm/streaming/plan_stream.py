@@ -96,3 +96,16 @@ def stream(
         raise CertificateError(certificate.explain())
     options = options or StreamOptions(allowances=plan.allowances, wiring=plan.wiring)
     return stream_plan(transport, plan.segments, on_progress, options, limits, joining, steer, warn)
+
+
+def telling(
+    notice: Callable[[str, float], None], *watchers: Callable[[StreamProgress], None]
+) -> Callable[[StreamProgress], None]:
+    """Return what tells a stream's progress as the share of its path time, and all of it to the watchers."""
+
+    def tell(told: StreamProgress) -> None:
+        notice("stream", told.path_s / told.total_s)
+        for watch in watchers:
+            watch(told)
+
+    return tell
