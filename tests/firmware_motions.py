@@ -57,7 +57,8 @@ class RestlessJoint:
         if kind == "pause" or steps < 3:
             self.rest_ticks += duration
             return Move(0)
-        add = ((end - self.interval) << 16) // (steps - 1)
+        add = (abs(end - self.interval) << 16) // (steps - 1)  # rounded to 0: no interval gets below the least
+        add = add if end >= self.interval else -add
         last = first + ((steps - 1) * (self.interval << 16) + (steps - 1) * (steps - 2) // 2 * add >> 16)
         self.rest_ticks = duration - last
         move = Move(2 * steps + positive, first, self.interval << 8, add)
