@@ -18,7 +18,9 @@ from planarm.output import writing
 from planarm.scene import Scene
 from planarm.stepping.certify import Certificate, Check
 from planarm.stepping.plan import Allowance, SegmentPlan
+from planarm_wire.errors import WireError
 from planarm_wire.messages import SPEC_HASH, Move, Segment
+from planarm_wire.wirings import board_of
 
 FORMAT = 3
 
@@ -58,7 +60,7 @@ def load_plan(path: Path) -> StoredPlan:
     """Read a plan.
 
     Raises:
-        PlanFileError: The file cannot be read, or is no plan of this format.
+        PlanFileError: The file cannot be read, is no plan of this format, or is for a wiring that is not known.
         CertificateError: It was changed after it was certified, or made for another wire.
     """
     try:
@@ -79,6 +81,10 @@ def load_plan(path: Path) -> StoredPlan:
         raise CertificateError(
             f"{path}: was made for wire {body['spec_hash']:08x}, this planarm speaks {SPEC_HASH:08x}; make it anew"
         )
+    try:
+        board_of(len(body["start_usteps"]), body["wiring"])
+    except WireError as error:
+        raise PlanFileError(f"{path}: no board executes it: {error}; make it anew with 'planarm plan'") from error
     return _from_json(body)
 
 

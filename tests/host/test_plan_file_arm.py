@@ -1,12 +1,14 @@
 """Plans are bound to the arm they were made for; the certificate is shown with every plan."""
 
+import json
 from dataclasses import asdict, replace
+from hashlib import sha256
 from pathlib import Path
 
 import pytest
 
 from planarm.cli.main import main
-from planarm.errors import CertificateError
+from planarm.errors import CertificateError, PlanFileError
 from planarm.pipeline import plan_scene, stored
 from planarm.plan_file import arm_hash, load_plan, require_arm, save_plan
 from planarm.report.tables import certificate_table
@@ -54,6 +56,27 @@ def test_allowances_come_back_from_the_file(plan, tmp_path):
     loaded = load_plan(tmp_path / "small.plan")
     assert loaded.segments == plan.segments
     assert len(loaded.segments.allowances) == len(plan.segments.segments)
+
+
+@pytest.mark.parametrize(
+    ("changed", "words"),
+    [
+        (
+            {"wiring": "ramps"},
+            "no board executes it: no wiring 'ramps' is known; there are own, cnc_shield; make it anew",
+        ),
+        ({"start_usteps": [0] * 5}, "no board executes it: .*5 joints; the wiring own has pins for 4; make it anew"),
+    ],
+)
+def test_a_plan_for_no_known_board_is_refused_as_a_file(plan, tmp_path, changed, words):
+    file = tmp_path / "small.plan"
+    save_plan(stored(plan), file)
+    body = json.loads(file.read_text()) | changed
+    del body["sha256"]
+    body["sha256"] = sha256(json.dumps(body, sort_keys=True, separators=(",", ":")).encode()).hexdigest()
+    file.write_text(json.dumps(body))
+    with pytest.raises(PlanFileError, match=rf"small.plan: {words}"):
+        load_plan(file)
 
 
 @pytest.mark.parametrize("red", [True, False])
