@@ -78,7 +78,9 @@ bool check_move(const Move& move, uint32_t duration_ticks, JointEnd& end) {
     if (add_saturated(end.rest_ticks, move.first_ticks) < least_ticks) return false;
     end.rest_ticks = duration_ticks - last_ticks;
     end.positive = move.positive;
-    end.usteps += move.positive ? static_cast<int16_t>(move.steps) : -static_cast<int16_t>(move.steps);
+    const uint32_t steps = move.steps;
+    end.usteps =
+        static_cast<int32_t>(static_cast<uint32_t>(end.usteps) + (move.positive ? steps : 0 - steps));
     return true;
 }
 

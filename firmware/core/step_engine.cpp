@@ -32,9 +32,10 @@ struct Ring {
 
 Ring rings[wire::JOINTS];
 
-// Moves a position on by steps of a run.
+// Moves a position on by steps of a run, modulo 2^32: SET_POSITION takes any.
 [[gnu::noinline]] void add_steps(int32_t& position_usteps, const Run& run, uint8_t steps) {
-    position_usteps += run.positive ? static_cast<int16_t>(steps) : static_cast<int16_t>(-steps);
+    const uint32_t before = static_cast<uint32_t>(position_usteps);
+    position_usteps = static_cast<int32_t>(run.positive ? before + steps : before - steps);
 }
 
 void clear(uint8_t joint) {

@@ -67,7 +67,9 @@ void serial_drop(uint8_t count) {
 
 bool serial_can_send() { return sending_left == 0; }
 
+// The frame's bytes are not volatile either: they are written before the interrupt may look at them.
 void serial_send(const uint8_t* bytes, uint8_t size) {
+    compiler_barrier();
     sending = bytes;
     sending_left = size;
     UCSR0B = _BV(RXCIE0) | _BV(UDRIE0) | _BV(RXEN0) | _BV(TXEN0);

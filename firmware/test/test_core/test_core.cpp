@@ -246,9 +246,67 @@ CASE(last_tick_of_a_move_is_the_closed_form) {
     }
 }
 
+namespace {
+
+// What a message's payload must have to be more than malformed; any length for those not named.
+size_t exact_length(uint8_t type, size_t any) {
+    using wire::MessageType;
+    switch (static_cast<MessageType>(type)) {
+        case MessageType::ENABLE:
+            return wire::ENABLE_BYTES;
+        case MessageType::START:
+            return wire::START_BYTES;
+        case MessageType::OVERRIDE:
+            return wire::OVERRIDE_BYTES;
+        case MessageType::STOP:
+            return wire::STOP_BYTES;
+        case MessageType::CONFIG:
+            return wire::CONFIG_BYTES;
+        case MessageType::SOFT_LIMITS:
+            return wire::SOFT_LIMITS_BYTES;
+        case MessageType::HOME:
+            return wire::HOME_BYTES;
+        case MessageType::SET_POSITION:
+            return wire::SET_POSITION_BYTES;
+        case MessageType::QUERY:
+        case MessageType::CLEAR:
+        case MessageType::RESUME:
+            return 0;
+        default:
+            return any;
+    }
+}
+
+void begin_session() { send(encode(0, 1, {wire::PROTOCOL_VERSION, 1, 2, 3, 4})); }
+
+void append_number(Bytes& bytes, uint32_t value) {
+    for (int i = 0; i < 4; ++i) bytes.push_back(static_cast<uint8_t>(value >> (8 * i)));
+}
+
+}  // namespace
+
+CASE(positions_count_on_over_the_ends_of_their_range) {
+    for (bool positive : {true, false}) {
+        power_on();
+        begin_session();
+        Bytes ends;
+        for (int joint = 0; joint < 2; ++joint) append_number(ends, positive ? 0x7FFFFFFF : 0x80000000);
+        send(encode(1, 0xD, ends));
+        send(encode(2, 3, {1}));
+        // Three steps of the first joint, 2,000 ticks after each other: the numbers of docs/protocol.md.
+        const uint8_t steps_dir = positive ? 7 : 6;
+        send(encode(3, 4, {0, 0, 0, 0xC1, 0x9A, 0x0C, steps_dir, 0x64, 0x80, 0xA0, 0x1F, 0x00, 0x00}));
+        Bytes lead;
+        append_number(lead, wire::MIN_LEAD_TICKS);
+        send(encode(4, 5, lead));
+        planarm_run(1000000);
+        CHECK(anything_stepped());
+    }
+}
+
 CASE(sound_frames_of_any_content_do_no_harm) {
     power_on();
-    send(encode(0, 1, {wire::PROTOCOL_VERSION, 1, 2, 3, 4}));
+    begin_session();
     for (int i = 0; i < 3000; ++i) {
         // The firmware may or may not expect this number; about half of the frames are carried out.
         static uint8_t seq = 1;
@@ -256,11 +314,19 @@ CASE(sound_frames_of_any_content_do_no_harm) {
         if (random_below(2) == 0) {
             for (uint8_t& byte : payload) byte &= 0x0F;
         }
-        const uint8_t type = static_cast<uint8_t>(random_below(10));
+        const uint8_t type = static_cast<uint8_t>(random_below(15));
+        if (random_below(4) != 0) payload.resize(exact_length(type, payload.size()));
+        if (type == 0xA && payload.size() == wire::CONFIG_BYTES && random_below(2) == 0) {
+            wire::Config& told = *reinterpret_cast<wire::Config*>(payload.data());
+            told.pin_map = wire::PinMap::OWN;
+            told.joints = wire::JOINTS;
+            told.wake_ticks &= 0xFFFF;
+            told.high_ticks = 0;
+        }
         send(encode(seq++, type, payload));
         if (random_below(100) == 0) {
-            send(encode(200, 1, {wire::PROTOCOL_VERSION, 1, 2, 3, 4}));
-            seq = 201;
+            begin_session();
+            seq = 1;
             send(encode(seq++, 6, {}));
             send(encode(seq++, 3, {1}));
         }
@@ -271,7 +337,7 @@ CASE(sound_frames_of_any_content_do_no_harm) {
 
 CASE(random_bytes_never_step) {
     power_on();
-    send(encode(0, 1, {wire::PROTOCOL_VERSION, 1, 2, 3, 4}));
+    begin_session();
     send(encode(1, 3, {1}));
     for (int i = 0; i < 3000; ++i) send(random_bytes(120));
     CHECK(!anything_stepped());
