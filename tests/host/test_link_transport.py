@@ -9,19 +9,26 @@ import os
 import pty
 import re
 import tty
+from contextlib import closing
+from pathlib import Path
 
 import pytest
 import serial
 
 from link_echo import write_echo_image
+from planarm.cli.main import main
 from planarm.errors import LinkError
 from planarm.link import released_image as images
 from planarm.link import serial_transport
+from planarm.link.arm_record import ArmSetup
+from planarm.link.exchange import open_session
 from planarm.link.transport import open_transport
+from planarm.scene import load_scene
 from planarm_wire import messages
 from planarm_wire.codec import decode, encode
 from planarm_wire.framing import FrameDecoder, encode_frame
 
+EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 TIOCGEXCL = 0x80045440  # Linux, asm-generic/ioctls.h: tells whether TIOCEXCL holds
 
 
@@ -53,6 +60,23 @@ def test_an_unknown_scheme_names_the_known_ones():
 def test_the_emulator_takes_an_image_and_a_bridge_and_nothing_else(url):
     with pytest.raises(LinkError, match=r"takes sim://, sim://\?image=PATH, sim://\?board=NAME with one of uno, "):
         open_transport(url)
+
+
+def test_a_board_that_contradicts_the_scenes_is_refused():
+    """The image would be one board's, drivers and pins another's: the arm would stand still without a word."""
+    three = load_scene(EXAMPLES / "three_links.toml")
+    words = r"the scene's arm needs the board uno_four; leave board=uno out, or change board\.wiring"
+    for told in ({"board": three.board}, {"setup": ArmSetup(three, (0, 0, 0))}):
+        with pytest.raises(LinkError, match=words):
+            open_transport("sim://?board=uno", **told)
+        with closing(open_transport("sim://?board=uno_four", **told)) as line:
+            assert open_session(line).joints == 4
+
+
+def test_jog_refuses_another_board_than_the_scenes(capsys):
+    with pytest.raises(SystemExit):
+        main(["jog", str(EXAMPLES / "three_links.toml"), "1", "1", "--port", "sim://?board=cnc_shield_four"])
+    assert "needs the board uno_four" in capsys.readouterr().err
 
 
 def test_a_missing_or_damaged_image_is_named(tmp_path):

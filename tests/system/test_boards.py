@@ -115,7 +115,7 @@ STRONG = replace(scene_of(1).joints[0].motor, holding_torque_nm=50.0, inductance
 )
 def test_a_plan_for_another_board_is_refused_before_anything_moves(image, words, tmp_path):
     with pytest.raises(LinkError, match=words):
-        run_scene(scene_of(3), f"sim://?board={image}", tmp_path, no_notice)
+        run_scene(scene_of(3), f"sim://?image={released_image(image)}", tmp_path, no_notice)
 
 
 def test_every_board_tells_its_joints():

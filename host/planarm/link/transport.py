@@ -3,7 +3,8 @@
 ==============================  =====================================================================
 ``sim://``                      the emulated Uno in this process, in virtual time, with the released image
 ``sim://?image=PATH``           the same with another flash image (Intel HEX)
-``sim://?board=NAME``           the same with a board's released image; without it the scene's, or uno
+``sim://?board=NAME``           the same with a board's released image; without it the scene's, or uno; it must be
+                                the scene's where there is one
 ``sim://?usb=16u2``             the same with the delays and limits of the board's USB bridge
 ``sim://?isr=1``                the same, its waveforms tell which interrupt runs (`isr`); about three times slower
 ``/dev/ttyACM0``, ``COM3``      a serial port or a pty
@@ -141,13 +142,18 @@ def _open_emulator(url: str, baud: int, setup: ArmSetup | None, board: Board | N
     kinds: dict[str, Literal["direct", "16u2"]] = {"direct": "direct", "16u2": "16u2"}
     usb = kinds.get(options.get("usb", ["direct"])[-1])
     isr = {"0": False, "1": True}.get(options.get("isr", ["0"])[-1])
-    board = board or emulated_board(setup)
-    named = options.get("board", [board.name])[-1]
+    wanted = board or (setup.scene.board if setup else None)
+    named = options.get("board", [(wanted or emulated_board(None)).name])[-1]
     known = {"image", "board", "usb", "isr"}
     if parts.netloc or parts.path or set(options) - known or usb is None or isr is None or named not in BOARDS:
         raise LinkError(
             f"port {url!r}: the emulator takes sim://, sim://?image=PATH, sim://?board=NAME with one of"
             f" {', '.join(BOARDS)}, sim://?usb=16u2, sim://?isr=1, or several of these by &"
+        )
+    if wanted is not None and named != wanted.name:
+        raise LinkError(
+            f"port {url!r}: the scene's arm needs the board {wanted.name}; leave board={named} out, or change"
+            " board.wiring in the scene"
         )
     images = options.get("image")
     line = SimTransport(images[-1] if images else released_image(named), baud, setup, usb, BOARDS[named])
