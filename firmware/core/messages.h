@@ -13,7 +13,7 @@ namespace wire {
 // Both ends must have the same.
 constexpr uint8_t PROTOCOL_VERSION = 2;
 // Of the specification without its wording.
-constexpr uint32_t SPEC_HASH = 0x3F19A5D5UL;
+constexpr uint32_t SPEC_HASH = 0xE8A26478UL;
 
 // Ends every frame.
 constexpr uint8_t DELIMITER = 0x7E;
@@ -80,6 +80,8 @@ constexpr uint32_t MAX_SEGMENT_TICKS = 1073741823UL;
 constexpr uint16_t MAX_SEGMENT_STEPS = 32767U;
 // Least lead of START, 3.5 ms, in which the first slice of all joints is prepared.
 constexpr uint16_t MIN_LEAD_TICKS = 56000U;
+// Path that the queue must hold beyond what a rest needs, 4.1 ms; with less the device slows down.
+constexpr uint32_t STARVING_TICKS = 65536UL;
 // Least high time of a step pulse, 3.5 us.
 constexpr uint8_t MIN_STEP_HIGH_TICKS = 56;
 // Least low time of a step pulse, 2.5 us.

@@ -28,8 +28,7 @@ constexpr int32_t LATEST_ARRIVAL_TICKS = 40000;
 // After a rest on the path the joints start this long after they are told to: their DIR pins are set by then.
 constexpr uint32_t THAW_LEAD_TICKS = 16000;
 
-// What the queue must hold beyond the need to rest. A payload that still fits means that more can come.
-constexpr uint32_t STARVING_MARGIN_TICKS = 65536;
+// A payload that still fits means that more can come.
 constexpr uint16_t FULL_BYTES = wire::MAX_PAYLOAD_BYTES;
 
 constexpr uint8_t MAX_SLICES = 4;
@@ -185,7 +184,7 @@ bool is_calm() {
     way.ends_segment = left_ticks <= slice_ticks;
     way.path_ticks = way.ends_segment ? static_cast<uint16_t>(left_ticks) : slice_ticks;
     const bool quickly =
-        wish == Wish::REST_QUICKLY || is_starving(slice.end_path() + way.path_ticks, STARVING_MARGIN_TICKS);
+        wish == Wish::REST_QUICKLY || is_starving(slice.end_path() + way.path_ticks, wire::STARVING_TICKS);
     way.target = quickly || wish == Wish::REST ? path_clock::MAX_STRETCH : override_stretch;
     way.rate = way.target > slice.end_stretch() ? slow_value : fast_value;
     if (!quickly) way.rate >>= 1;
@@ -286,14 +285,14 @@ bool Motion::may_freeze() const {
         starved = false;
         return Progress::AT_REST;
     }
-    if (starved && is_starving(slice.end_path(), 2 * STARVING_MARGIN_TICKS)) return Progress::GOING;
+    if (starved && is_starving(slice.end_path(), 2 * wire::STARVING_TICKS)) return Progress::GOING;
     const bool was_starved = starved;
     thaw();
     return was_starved ? Progress::FED : Progress::GOING;
 }
 
 [[gnu::noinline]] Progress Motion::freeze_if_due() {
-    const bool starving = wish == Wish::GO && is_starving(slice.end_path(), STARVING_MARGIN_TICKS);
+    const bool starving = wish == Wish::GO && is_starving(slice.end_path(), wire::STARVING_TICKS);
     if (wish == Wish::GO && !starving) return Progress::GOING;
     if (!may_freeze() || !step_engine::freeze(frozen_ticks)) return Progress::GOING;
     frozen = true;

@@ -14,7 +14,7 @@ from planarm_wire.layout import EACH_JOINT, END, Field
 
 PROTOCOL_VERSION: Final = 2
 """Both ends must have the same."""
-SPEC_HASH: Final = 0x3F19A5D5
+SPEC_HASH: Final = 0xE8A26478
 """Hash of the specification without its wording."""
 DELIMITER: Final = 0x7E
 """Ends every frame."""
@@ -87,6 +87,8 @@ MAX_SEGMENT_STEPS: Final = 32_767
 """Most steps of one joint in one segment."""
 MIN_LEAD_TICKS: Final = 56_000
 """Least lead of START, 3.5 ms, in which the first slice of all joints is prepared."""
+STARVING_TICKS: Final = 65_536
+"""Path that the queue must hold beyond what a rest needs, 4.1 ms; with less the device slows down."""
 MIN_STEP_HIGH_TICKS: Final = 56
 """Least high time of a step pulse, 3.5 us."""
 MIN_STEP_LOW_TICKS: Final = 40

@@ -1,6 +1,8 @@
 """What a motion that is left at speed is made of: parts of paths, timing from a speed, segments that stay, borders."""
 
+import re
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -20,7 +22,7 @@ from planarm.stepping.schedule import with_first_steps
 from planarm.stepping.segments import Coding, compress, expand
 from planarm.trajectory.limits import Limits
 from planarm.trajectory.timing import fastest_motion
-from planarm_wire.messages import SLICE_TICKS, TICKS_HZ
+from planarm_wire.messages import SLICE_TICKS, STARVING_TICKS, TICKS_HZ
 from planarm_wire.steps import duration_ticks
 
 LIMITS = Limits.of(SCENE)
@@ -103,7 +105,7 @@ def test_a_border_leaves_the_device_enough_until_the_other_motion_is_there(plan,
         end = start + duration_ticks(segment)
         for path_at in range(start, end, SLICE_TICKS):
             if path_at <= ready_s * TICKS_HZ + 4 * SLICE_TICKS:
-                needed = max(needed, min(path_at + SLICE_TICKS, end) + allowance.need_ticks + 65_536 + 240_000)
+                needed = max(needed, min(path_at + SLICE_TICKS, end) + allowance.need_ticks + STARVING_TICKS + 240_000)
         start = end
     assert border.tick >= needed
     assert border.tick == sum(map(duration_ticks, plan.segments.segments[: border.segment]))
@@ -176,3 +178,16 @@ def test_a_stream_takes_no_plan_that_begins_otherwise(plan):
 
 def test_a_border_tells_its_time():
     assert Border(3, TICKS_HZ // 2).path_s == 0.5
+
+
+def test_how_much_the_device_wants_to_hold_is_written_once():
+    """In messages.toml: firmware, margin of the line and borders of motions go by the same."""
+    root = Path(__file__).resolve().parents[2]
+    places = (
+        *root.glob("firmware/core/*.cpp"),
+        *root.glob("host/planarm/link/*.py"),
+        *root.glob("host/planarm/operations/*.py"),
+    )
+    users = [path.name for path in places if "STARVING_TICKS" in path.read_text()]
+    assert sorted(users) == ["margin.py", "motion.cpp", "splicing.py"]
+    assert [path.name for path in places if re.search(r"\b65_?536\b", path.read_text())] == []

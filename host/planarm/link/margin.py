@@ -23,9 +23,11 @@ from planarm_wire.boards import Board
 from planarm_wire.codec import encoded_bytes
 from planarm_wire.messages import (
     MAX_PAYLOAD_BYTES,
+    MIN_LEAD_TICKS,
     NEED_UNIT_TICKS,
     QUEUE_FRAME_BYTES,
     SLICE_TICKS,
+    STARVING_TICKS,
     TICKS_HZ,
     Segment,
 )
@@ -46,8 +48,9 @@ TURNS = 2
 LEAST_SEEN_BYTES = 300
 FULL_PERCENT = 100
 
-STARVING_TICKS = 65_536 + SLICE_TICKS
-PREPARED_TICKS = 56_000
+SLICE_END_TICKS = STARVING_TICKS + SLICE_TICKS
+"""What the device must hold beyond a stop's need, seen from where a slice begins."""
+PREPARED_TICKS = MIN_LEAD_TICKS
 """By how much more path than a stop takes the device must hold when it prepares a slice: firmware/core/motion.cpp looks
 at the end of the slice, which it prepares so long, by its own clock, before its start."""
 
@@ -163,7 +166,7 @@ class _Supply:
         rate = percent / FULL_PERCENT
         ticks_a_byte = TICKS_HZ / max(1.0, USABLE_SHARE * self._seen.bytes_s - QUESTIONS_BYTES_S)
         turn_ticks = TURNS * self._seen.round_trip_s * TICKS_HZ
-        margin = STARVING_TICKS + PREPARED_TICKS * rate
+        margin = SLICE_END_TICKS + PREPARED_TICKS * rate
         line = board = 0.0
         running = 0
         for k in range(self._sent, len(self._needs)):

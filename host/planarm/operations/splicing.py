@@ -32,14 +32,14 @@ from planarm.smoothing.joint_blend import blend_poses
 from planarm.smoothing.joint_spline import JointSpline, part_of, run_on
 from planarm.stepping.certify import certify
 from planarm.stepping.schedule import go_on
-from planarm.stepping.slowing import LINK_MARGIN_TICKS, SpeedLimit
+from planarm.stepping.slowing import SpeedLimit, link_margin_ticks
 from planarm.trajectory.binding import report_timing
 from planarm.trajectory.limits import Limits
 from planarm.trajectory.motion import Trajectory
 from planarm.trajectory.timing import fastest_motion
 from planarm.workspace.joint_proof import JointWorld, joint_world, prove_joint_line
 from planarm.workspace.proof import PROVED
-from planarm_wire.messages import NEED_UNIT_TICKS, SLICE_TICKS, TICKS_HZ
+from planarm_wire.messages import NEED_UNIT_TICKS, SLICE_TICKS, STARVING_TICKS, TICKS_HZ
 from planarm_wire.rates import MESSAGE_SEGMENTS
 from planarm_wire.steps import duration_ticks
 
@@ -47,10 +47,6 @@ Floats = NDArray[np.float64]
 
 HANDED_OVER_TICKS = 4 * SLICE_TICKS
 """The device decides this long ahead whether it has to slow down."""
-STARVING_MARGIN_TICKS = 65_536
-"""What the device wants to hold beyond what a stop takes."""
-MARGIN_TICKS = STARVING_MARGIN_TICKS + LINK_MARGIN_TICKS
-"""What is to be held beyond a stop's need, with what the line may take."""
 MOST_CORNERS = 6
 """Corners of the old way up to which it may be left."""
 BETWEEN_RAD = 0.15
@@ -101,6 +97,8 @@ def first_border(plan: Plan, sent: int, ready_s: float) -> Border | None:
         ready_s: the path time by which the other motion is there; until then the device must not miss what comes next.
     """
     ticks, ready_ticks, wanted = 0, ready_s * TICKS_HZ, 0.0
+    # Beyond a stop's need, and with what the line may take.
+    margin_ticks = STARVING_TICKS + link_margin_ticks(plan.segments.board)
     # A message tells the largest need of its segments, rounded up.
     needs = [max(near) for near in _neighbours([allowance.need_ticks for allowance in plan.segments.allowances])]
     for k, (segment, need_ticks) in enumerate(zip(plan.segments.segments, needs, strict=True)):
@@ -109,7 +107,7 @@ def first_border(plan: Plan, sent: int, ready_s: float) -> Border | None:
         end = ticks + duration_ticks(segment)
         if ticks <= ready_ticks + HANDED_OVER_TICKS:
             last_slice = min(float(end), ready_ticks + HANDED_OVER_TICKS)
-            wanted = max(wanted, last_slice + SLICE_TICKS + need_ticks + NEED_UNIT_TICKS + MARGIN_TICKS)
+            wanted = max(wanted, last_slice + SLICE_TICKS + need_ticks + NEED_UNIT_TICKS + margin_ticks)
         ticks = end
     return None
 
