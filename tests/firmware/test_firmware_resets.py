@@ -16,7 +16,20 @@ import pytest
 from firmware_board import LEAD_TICKS, WAKE_TICKS, Board, EmulatedFirmware, run_of, segment_of
 from planarm_sim.cpu import registers as reg
 from planarm_sim.cpu.values import ResetCause
-from planarm_wire.messages import STEP_PINS, TICKS_HZ, WATCHDOG_MS, Enable, Reset, Segments, Start, State, Welcome
+from planarm_wire.messages import (
+    EMERGENCY_CODE,
+    EMERGENCY_REPEATS,
+    STEP_PINS,
+    TICKS_HZ,
+    WATCHDOG_MS,
+    Clear,
+    Enable,
+    Reset,
+    Segments,
+    Start,
+    State,
+    Welcome,
+)
 
 BOOT_CYCLES = 600_000
 MARK_CYCLES = 4 * 54_400  # four bytes of 3.4 ms
@@ -103,14 +116,27 @@ def test_drivers_that_were_enabled_are_told_after_a_reset(
     assert again.interrupted == 0, "this boot enabled nothing"
 
 
-def test_no_step_is_made_before_the_mark_is_written(emulated_firmware: EmulatedFirmware) -> None:
-    # ENABLE, segments and START in one go, with the shortest lead; resets around the first step.
+@pytest.mark.parametrize("behind", ["nothing", "RELEASE", "CLEAR"])
+def test_no_step_is_made_before_the_mark_is_written(emulated_firmware: EmulatedFirmware, behind: str) -> None:
+    # ENABLE, segments and START in one go, with the shortest lead; resets around the first step. RELEASE, and CLEAR
+    # after an emergency stop, leave a mark of their own, which is still being written when ENABLE comes.
     board = Board(emulated_firmware)
     board.hello()
+    if behind != "nothing":
+        board.ask(Enable(1))
+        board.run(WAKE_TICKS)
+    if behind == "CLEAR":
+        board.receive(bytes([EMERGENCY_CODE] * EMERGENCY_REPEATS))
+        board.run(40_000)
+        board.ask()
+    uno = emulated_firmware.uno
+    uno.clear_edges()
+    if behind != "nothing":
+        board.send(Enable(0) if behind == "RELEASE" else Clear())
+        board.run(14_000)
     for message in (Enable(1), Segments(0, 0, 0, (segment_of(400_000, run_of(200), last=True),)), Start(LEAD_TICKS)):
         board.send(message)
     board.run(60_000)
-    uno = emulated_firmware.uno
     started = uno.snapshot()
     board.run(WAKE_TICKS)
     first = board.rises(0)[0]
