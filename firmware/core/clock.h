@@ -10,7 +10,8 @@ namespace clock {
 // Sets the clock to `ticks`, whose low 16 bits must be the timer's. For start-up.
 void reset(uint32_t ticks);
 
-// Ticks now. Right as long as it is asked for once a second; the watchdog comes earlier.
+// Ticks now. Right as long as it is asked for once a second; the watchdog comes earlier. Never with
+// interrupts off: a lap that is due would be waited for without end.
 uint32_t now();
 
 // The 32-bit time of a reading of the timer less than 65,536 ticks (4.1 ms) after the last time that was
@@ -18,7 +19,7 @@ uint32_t now();
 uint32_t extend(uint16_t counter);
 
 // Looks at the clock for a pass of the main program: what follows are that moment's, for all that the pass
-// does.
+// does or until it looks again.
 void begin_pass();
 uint32_t pass_ticks();
 // Ticks until then; below 0 when that is past.

@@ -330,17 +330,19 @@ Progress Motion::serve() {
     if (frozen) return serve_frozen();
     begun = begun || clock::has_come(begin_ticks);
     if (!step_engine::serve()) return Progress::MISSED;
-    prepare();
     bool ends_motion = false;
     if (retire(ends_motion)) {
         clear();
         return ends_motion ? Progress::DONE : Progress::UNDERRUN;
     }
-    return freeze_if_due();
+    const Progress progress = freeze_if_due();
+    if (progress == Progress::GOING) prepare();  // last, as it takes longest: the pass has one time
+    return progress;
 }
 
 void Motion::halt() {
     bool ends_motion;
+    clock::begin_pass();  // what ended in this pass is executed, too
     if (running && !frozen && !step_engine::missed()) retire(ends_motion);
     step_engine::stop();
     clear();

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import importlib.util
 import shutil
 import subprocess
 import sys
 from pathlib import Path
+from types import ModuleType
 
 import pytest
 
@@ -23,6 +25,26 @@ def native_firmware(tmp_path_factory: pytest.TempPathFactory) -> NativeFirmware:
     done = subprocess.run(build, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     return NativeFirmware(out / "libplanarm_firmware.so")
+
+
+@pytest.fixture(scope="session")
+def builder() -> ModuleType:
+    """firmware/build.py as a module."""
+    spec = importlib.util.spec_from_file_location("firmware_build", ROOT / "firmware" / "build.py")
+    assert spec is not None and spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[spec.name] = module  # its dataclasses look there for their annotations
+    spec.loader.exec_module(module)
+    return module
+
+
+@pytest.fixture(scope="session")
+def uno_image(builder: ModuleType, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The Uno's image built by avr-gcc, its elf beside it."""
+    if shutil.which("avr-gcc") is None:
+        pytest.skip("avr-gcc is not installed (Debian: gcc-avr, avr-libc): no image is built")
+    image: Path = builder.build_image(tmp_path_factory.mktemp("image"), "uno")
+    return image
 
 
 @pytest.fixture(scope="session")

@@ -9,6 +9,7 @@ import shutil
 import subprocess
 import sys
 from pathlib import Path
+from types import ModuleType
 
 import pytest
 
@@ -99,6 +100,48 @@ def test_a_program_that_uses_a_register_of_the_interrupts_is_refused(tmp_path: P
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert done.returncode == 1
     assert "uses a register of the interrupts" in done.stderr
+
+
+SAVES = """\
+000000c0 <__vectors_end>:
+  c0:\tcall\t0x{entry} <__prologue_saves__+0x{offset}>
+  c4:\t{other}
+
+00000100 <__prologue_saves__>:
+ 100:\tpush\tr2
+ 118:\tpush\tr14
+ 11a:\tpush\tr15
+ 11c:\tpush\tr16
+"""
+
+
+@pytest.mark.parametrize(
+    ("entry", "other", "refused"),
+    [
+        (0x1C, "ret", None),
+        (0x1A, "ret", "__prologue_saves__ 11a"),
+        (0x18, "ret", "__prologue_saves__ 118"),
+        (0x00, "ret", "__prologue_saves__ 100"),
+        (0x1C, "jmp\t0x11a <__prologue_saves__+0x1a>", "__prologue_saves__ 11a"),
+        (0x1C, "movw\tr14, r24", "__vectors_end c4"),
+        (None, "ret", "__prologue_saves__ 100"),
+    ],
+)
+def test_an_entry_into_the_common_prologue_that_saves_a_kept_register_is_refused(
+    builder: ModuleType, monkeypatch: pytest.MonkeyPatch, entry: int | None, other: str, refused: str | None
+) -> None:
+    # As a library function does that saves r14. Entered nowhere, all of it counts.
+    listing = SAVES.format(entry=f"{0x100 + (entry or 0):x}", offset=f"{entry or 0:x}", other=other)
+    if entry is None:
+        listing = listing.partition("\n\n")[2]
+    told = {"avr-nm": "000000c0 T __ctors_end\n", "avr-objdump": listing}
+    monkeypatch.setattr(builder, "run", lambda command: told[command[0]])
+    flags = [f"-ffixed-r{number}" for number in range(2, 16)]
+    if refused is None:
+        builder.require_free_registers(Path("any.elf"), flags)
+        return
+    with pytest.raises(builder.BuildError, match=f"{refused}: .* uses a register of the interrupts"):
+        builder.require_free_registers(Path("any.elf"), flags)
 
 
 LOCK_CYCLES = {"uno": 13, "uno_four": 27}

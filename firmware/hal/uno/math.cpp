@@ -1,3 +1,6 @@
+// Naked functions that change r0, r18 to r27, r30 and r31, as any call may, and tell the compiler nothing of
+// it: platformio.ini keeps it from looking into their bodies for what they leave alone (-fno-ipa-ra).
+
 #include "hal_math.h"
 
 namespace hal {
