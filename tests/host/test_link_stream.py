@@ -489,6 +489,32 @@ def test_a_good_line_changes_nothing_and_takes_an_earlier_override_back():
     assert (said, result.path_clock_percent, line.device.override_percent) == ([], 100, 100)
 
 
+@pytest.mark.parametrize(("first", "then"), [(320_000, 64_000), (64_000, 320_000)])
+@pytest.mark.parametrize("asked", [100, 10])
+def test_a_motion_that_goes_on_otherwise_is_held_against_the_line_again(first, then, asked):
+    """The same line of 2,800 bytes a second, to which a calm motion and a dense one follow one another."""
+    line, said, rates = ModelLine(Damage(delay_s=0.02), Damage(delay_s=0.02)), [], []
+    plan = motion(200, ticks=first)
+    new = []
+
+    def steer(stream):
+        if stream.executed_segments > 10 and not new:
+            rates.append(stream.path_clock_percent)
+            if asked < 100:
+                stream.override(asked)
+            new.extend((*plan[: stream.sent_segments], *motion(200, ticks=then, seed=2)))
+            allowances = (Allowance(1e-6, 1e-6, 0.0),) * len(new)
+            stream.go_on_with(new, allowances)
+
+    result = stream_plan(line, plan, steer=steer, warn=said.append)
+    assert line.device.segments_executed == new
+    calm, dense = (rates[0], result.path_clock_percent)[:: 1 if first > then else -1]
+    assert calm == 100
+    assert 5 < dense < 60
+    assert [text.startswith("from here on the line was seen") for text in said] == [first > then]
+    assert line.device.override_percent == min(asked, result.path_clock_percent)
+
+
 def margin_of(segments, sent, seen, allowances=()):
     return line_margin(segments, sent, seen, BOARDS["uno"], allowances)
 

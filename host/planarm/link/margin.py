@@ -7,7 +7,7 @@ it, and is read when the board has time. The device slows down by itself where l
 the path clock is told to run at the greatest rate at which that never happens.
 """
 
-from bisect import bisect_left
+from bisect import bisect_left, bisect_right
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import accumulate
@@ -128,6 +128,12 @@ def line_margin(
     return Margin(supply.asked_bytes_s(), seen, percent, supply.starts[-1] / TICKS_HZ)
 
 
+def fill_queue(segments: Sequence[Segment], board: Board) -> int:
+    """Return how many of the first segments a board's queue holds."""
+    filled = list(accumulate(map(_queued_bytes, segments)))
+    return bisect_right(filled, board.queue_bytes)
+
+
 class _Supply:
     """A motion's segments on their way to the device."""
 
@@ -144,8 +150,7 @@ class _Supply:
         self.starts = list(accumulate(durations, initial=0))
         self._sent, self._seen = sent, seen
         self._line_bytes = [size + FRAME_BYTES / SEGMENTS_A_FRAME for size in sizes]
-        queued = [size + QUEUED_HEAD_BYTES / SEGMENTS_A_FRAME for size in sizes]
-        self._queued = list(accumulate(queued, initial=0.0))
+        self._queued = list(accumulate(map(_queued_bytes, segments), initial=0.0))
         self._needs = [NEED_UNIT_TICKS * -(-one.need_ticks // NEED_UNIT_TICKS) for one in allowances]
         self._needs = self._needs or [0.0] * len(segments)
         self._board = board
@@ -182,6 +187,10 @@ class _Supply:
             if free >= MAX_PAYLOAD_BYTES and self.starts[k] - path < need + margin:
                 return False
         return True
+
+
+def _queued_bytes(segment: Segment) -> float:
+    return encoded_bytes(segment) + QUEUED_HEAD_BYTES / SEGMENTS_A_FRAME
 
 
 def _work_ticks(board: Board, joints: int, segment: Segment, ticks: int) -> float:

@@ -16,7 +16,7 @@ from itertools import accumulate
 
 from planarm.errors import CertificateError, LinkError, StepsDifferError
 from planarm.link.clock_sync import Span
-from planarm.link.margin import Margin, SeenLine, line_margin
+from planarm.link.margin import Margin, SeenLine, fill_queue, line_margin
 from planarm.link.packing import Packer
 from planarm.link.path_time import PathTime
 from planarm.link.plan_steps import LOOK_AHEAD, PlanSteps
@@ -84,6 +84,8 @@ class Stream:
         self.path_clock_percent = PERCENT
         self.margin: Margin | None = None
         self._warn = warn
+        self._line: SeenLine | None = None
+        self._asked_percent = PERCENT
         self._filling_since_s = 0.0
         self._filled_from_bytes = 0
         self._start_sent_s, self._lead_ticks_sent = 0.0, 0
@@ -143,6 +145,7 @@ class Stream:
 
     def override(self, percent: int) -> None:
         """Let the path clock run at 1 to 100 % of the planned rate."""
+        self._asked_percent = percent
         self._orders.append(Override(percent))
 
     def stop(self, *, quick: bool = False) -> None:
@@ -160,6 +163,9 @@ class Stream:
     def go_on_with(self, segments: Sequence[Segment], allowances: Sequence[Allowance]) -> None:
         """Take another plan from here on: its segments that were sent are the same.
 
+        Where the line does not carry what is left of it, or carries more than what was planned before, the path clock
+        is told so.
+
         Raises:
             CertificateError: it has other first segments, or does not end as a plan does.
         """
@@ -173,6 +179,7 @@ class Stream:
         self._path_time = PathTime(self._segments, self._ends_ticks, self.steps)
         self._options = replace(self._options, allowances=tuple(allowances))
         self._packer.go_on_with(segments, allowances)
+        self._set_path_clock_again()
 
     @property
     def deadline_s(self) -> float:
@@ -272,15 +279,28 @@ class Stream:
 
     def _set_path_clock(self, now_s: float) -> None:
         """Let the path clock run as planned, or slower where the line was not seen to carry the plan."""
+        seen = self._session.arq_counters.bytes_taken - self._filled_from_bytes
+        self._line = SeenLine.of(seen, now_s - self._filling_since_s, self._session.quickest_s)
         if self.sent_segments < len(self._segments):
-            seen = self._session.arq_counters.bytes_taken - self._filled_from_bytes
-            line = SeenLine.of(seen, now_s - self._filling_since_s, self._session.quickest_s)
-            margin = line_margin(self._segments, self.sent_segments, line, self._board, self._options.allowances)
+            margin = line_margin(self._segments, self.sent_segments, self._line, self._board, self._options.allowances)
             self.margin, self.path_clock_percent = margin, margin.percent
             if margin.percent < PERCENT and self._warn is not None:
                 self._warn(str(margin))
         if self._status.override_percent != self.path_clock_percent:
             self._session.send(Override(self.path_clock_percent), now_s)
+
+    def _set_path_clock_again(self) -> None:
+        """The same for what is left, seen from a full queue; while it fills the device slows down by itself."""
+        if self._line is None:
+            return
+        left, allowances = self._segments[self._executed :], self._options.allowances[self._executed :]
+        margin = line_margin(left, fill_queue(left, self._board), self._line, self._board, allowances)
+        if margin.percent == self.path_clock_percent:
+            return
+        self.margin, self.path_clock_percent = margin, margin.percent
+        self._orders.append(Override(min(margin.percent, self._asked_percent)))
+        if margin.percent < PERCENT and self._warn is not None:
+            self._warn(f"from here on {margin}")
 
     def _lead_ticks(self, now_s: float) -> int:
         """Return the time from START to the first segment."""
