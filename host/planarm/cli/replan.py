@@ -40,7 +40,7 @@ def execute(options: argparse.Namespace) -> int:
         port = scene.link.port if options.port is None else options.port
         setup = ArmSetup(scene, first[1].segments.start_usteps)
         with closing(open_transport(port, scene.link.baud, setup)) as transport:
-            result = run_live(scene, transport, source, notice, perf_counter, first)
+            result = run_live(scene, transport, source, notice, perf_counter, first, warn=notice.warn)
     told = result.figures()
     if not options.json:
         _print(told)

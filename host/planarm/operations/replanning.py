@@ -154,6 +154,7 @@ class _Run:
     host_s: Callable[[], float]
     beside: Beside
     margin_cm: float
+    warn: Callable[[str], None] | None
     began_s: float | None = None
     noticed_s: float = 0.0
     stopping: Verdict | None = None
@@ -282,6 +283,7 @@ def run_live(
     host_s: Callable[[], float],
     first: tuple[RoadmapTask, Plan] | None = None,
     beside: Beside | None = None,
+    warn: Callable[[str], None] | None = None,
 ) -> LiveResult:
     """Carry a scene out on a board while obstacles may appear.
 
@@ -293,6 +295,7 @@ def run_live(
         host_s: a clock of the host's.
         first: the roadmap and the plan, when they are there already (`first_plan`).
         beside: plans while the arm moves; by default in a thread, or as long as that would take in an emulator's time.
+        warn: told what will be otherwise than planned, as on a slow line.
 
     Raises:
         PlanarmError: the first plan cannot be made, or the line or the board fails.
@@ -301,7 +304,7 @@ def run_live(
     own = InThread() if isinstance(transport.clock, RealClock) else AsLong(host_s)
     margin_cm = planning_margin_cm(scene)
     with closing(own):
-        run = _Run(scene, task, plan, obstacles, transport, host_s, beside or own, margin_cm, plans=[plan])
+        run = _Run(scene, task, plan, obstacles, transport, host_s, beside or own, margin_cm, warn, plans=[plan])
         end_rad, reason = _legs(run, notice)
     met, made, plans = tuple(run.encounters), tuple(run.new_plans), tuple(run.plans)
     return LiveResult(not reason, reason, met, made, plans, end_rad, run.began_s or 0.0)
@@ -370,7 +373,7 @@ def _stream_leg(run: _Run) -> tuple[Floats, Verdict | None]:
     options = replace(options_for(plan.scene, plan.segments), ahead_s=AHEAD_S)
     start = np.array(plan.segments.start_usteps)
     try:
-        result = stream_plan(run.transport, plan.segments.segments, options=options, steer=run.watch)
+        result = stream_plan(run.transport, plan.segments.segments, options=options, steer=run.watch, warn=run.warn)
         moved = moved_usteps(result.ledger_before, result.ledger_after)
     except StreamError as error:
         if run.stopping is None:
