@@ -11,9 +11,20 @@ from pathlib import Path
 
 import pytest
 
-from firmware_board import LEAD_TICKS, WAKE_TICKS, Board, EmulatedFirmware, Schedule, end_motion, run_of, segment_of
+from firmware_board import (
+    LEAD_TICKS,
+    WAKE_TICKS,
+    Board,
+    Delays,
+    EmulatedFirmware,
+    Schedule,
+    end_motion,
+    run_of,
+    segment_of,
+)
 from firmware_motions import fast_moves
 from firmware_tracer import SCHEDULED, Tracer
+from planarm_sim.cpu import registers as reg
 from planarm_wire.codec import encode
 from planarm_wire.framing import encode_frame
 from planarm_wire.messages import (
@@ -50,8 +61,37 @@ MOST_OFF_TICKS = {"uno_four": (0, 0, 192, 192), "cnc_shield": (160, 160), "cnc_s
 LOOK_CYCLES, ONE_STEP_CYCLES, BOTH_CYCLES = (62, 76), (127, 210), (278, 288)
 
 
-def emulated(name: str) -> EmulatedFirmware:
-    return EmulatedFirmware(RELEASE / f"{name}.hex", BOARDS[name])
+class Scheduled(EmulatedFirmware):
+    """The emulated board; notes for which cycle the chip has scheduled the first step of joints 1 and 2."""
+
+    LOOK_TICKS = 4000  # a joint at rest is started earlier than that before its step
+
+    def power_on(self, boot_count: int, tick: int, delays: Delays) -> None:
+        super().power_on(boot_count, tick, delays)
+        self.first_at: dict[int, int] = {}
+        self._timer_from = self.uno.cycle - self._word(reg.TCNT1L)  # while no instruction looks at the timer
+
+    def run(self, ticks: int) -> None:
+        end = self.uno.cycle + ticks
+        while len(self.first_at) < 2 and end > self.uno.cycle + self.LOOK_TICKS:
+            super().run(self.LOOK_TICKS)
+            self._look()
+        super().run(end - self.uno.cycle)
+        self._look()
+
+    def _look(self) -> None:
+        chip = self.uno._chip
+        (on,) = chip.peek_data(range(reg.TIMSK1, reg.TIMSK1 + 1))
+        for joint, (mask, compare) in enumerate(((2, reg.OCR1AL), (4, reg.OCR1BL))):
+            if on & mask and joint not in self.first_at:
+                self.first_at[joint] = chip.cycle + (self._timer_from + self._word(compare) - chip.cycle) % 65_536
+
+    def _word(self, address: int) -> int:
+        return int.from_bytes(self.uno._chip.peek_data(range(address, address + 2)), "little")
+
+
+def emulated(name: str) -> Scheduled:
+    return Scheduled(RELEASE / f"{name}.hex", BOARDS[name])
 
 
 def steady(name: str, interval: int, seconds: float, duration: int = 8 * SLICE_TICKS) -> list[Segment]:
@@ -91,8 +131,9 @@ def assert_near_schedule(board: Board, name: str, motion: list[Segment], status:
     assert (status.state, status.fault, status.overruns) == (State.READY, Fault.NONE, 0)
     schedule, wiring = Schedule.of(motion), board.wiring
     assert status.ledger.position_usteps == schedule.positions()
-    first = [steps[0][0] for steps in schedule.steps]
-    begin = min(board.rises(0)[0] - first[0], board.rises(1)[0] - first[1])
+    assert isinstance(board._firmware, Scheduled)
+    begin, and_again = (at - schedule.steps[joint][0][0] for joint, at in sorted(board._firmware.first_at.items()))
+    assert begin == and_again, "of both joints with a timer's compare unit"
     for joint, steps in enumerate(schedule.steps):
         rises = board.rises(joint)
         off = [rise - begin - tick for rise, (tick, _) in zip(rises, steps, strict=True)]
