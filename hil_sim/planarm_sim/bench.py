@@ -79,6 +79,9 @@ class SerialLine(Protocol):
     def read(self) -> bytes:
         """Take everything received so far."""
 
+    def discard(self) -> int:
+        """Throw away everything that the board sent and nobody read; returns how many bytes."""
+
     def peek(self) -> bytes:
         """Everything received so far, left in place."""
 

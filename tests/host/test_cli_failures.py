@@ -123,26 +123,3 @@ def test_a_goal_that_is_the_start_is_done_at_once(capsys, tmp_path):
     code, out, _ = leave(capsys, "run", scene, "--out", tmp_path / "out", "--json")
     told = json.loads(out)
     assert (code, told["segments"], told["net_usteps"], told["steps_at_pins"]) == (0, 0, [0, 0], [0, 0])
-
-
-EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
-
-
-@pytest.mark.parametrize(
-    ("words", "told"),
-    [
-        (("envelope", EXAMPLES / "three_links.toml"), "arm.link_lengths_cm: [22.0, 18.0, 12.0] given, maps of"),
-        (
-            ("plan", EXAMPLES / "three_links.toml", "--alternatives", "2"),
-            "'mpd_star_lite' draws its",
-        ),
-        (("plan", EXAMPLES / "three_links.toml", "--planner", "taut", "-o", "x.plan"), "arm.link_lengths_cm"),
-        (("emulate", "--board", "uno", "--scene", EXAMPLES / "three_links.toml"), "is wired for uno_four"),
-        (("goto", EXAMPLES / "three_links.toml", "--port", "sim://"), "give the point X Y in cm, or joint angles"),
-        (("zero", EXAMPLES / "three_links.toml", "--deg", "1", "2", "--port", "sim://"), "2 angles given, one a joint"),
-    ],
-)
-def test_what_takes_two_links_or_another_board_says_so(capsys, tmp_path, monkeypatch, words, told):
-    monkeypatch.chdir(tmp_path)
-    code, _, err = leave(capsys, *words)
-    assert (code, told in err) == (2, True), err

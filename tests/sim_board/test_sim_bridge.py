@@ -20,10 +20,19 @@ POWER_UP, RESET = b"R\x01", b"R\x02"  # what echo.S sends first: 'R' and MCUSR
 
 class Rig:
     def __init__(
-        self, acts, *, image="echo.hex", speed="real", boot_s=0.0, cost_s=0.0, room=10**6, usb="direct"
+        self,
+        acts,
+        *,
+        image="echo.hex",
+        speed="real",
+        boot_s=0.0,
+        cost_s=0.0,
+        room=10**6,
+        usb="direct",
+        power_up_s=BOOT_S,
     ) -> None:
         self.uno = Uno.from_hex(DATA / image, usb=usb)
-        self.uno.run(seconds=BOOT_S)  # the program has greeted, and cleared MCUSR
+        self.uno.run(seconds=power_up_s)  # the program has greeted, and cleared MCUSR
         self.clock = FakeClock()
         self.line = FakeLine(self.clock, acts, room)
         self.said: list[str] = []
@@ -113,6 +122,16 @@ def test_opening_resets_the_board_as_a_uno_does():
     assert rig.line.text == RESET + RESET + b"b"
     assert rig.bridge.counts.opened == 2
     assert rig.bridge.counts.lost_bytes == len(POWER_UP), "sent before anyone had opened"
+
+
+@pytest.mark.parametrize("usb", ["direct", "16u2"])
+@pytest.mark.parametrize("opened_s", [0.000_05, 0.001, 0.003])
+def test_what_the_old_program_sent_does_not_come_after_the_reset(usb, opened_s):
+    """The USB bridge keeps bytes for up to 4 ms: who opens the line in between gets the new program's only."""
+    rig = Rig([(opened_s, "open")], usb=usb, boot_s=0.01, power_up_s=0.0)
+    rig.bridge.run(seconds=0.05)
+    assert rig.line.text in (RESET, b"R\x03"), "MCUSR also tells the power-up when the program had not cleared it"
+    assert rig.bridge.counts.lost_bytes + rig.bridge.counts.to_host_bytes <= len(POWER_UP) + len(RESET)
 
 
 def test_a_host_that_leaves_dtr_up_resets_the_board_only_once():

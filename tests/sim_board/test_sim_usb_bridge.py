@@ -37,6 +37,16 @@ def test_few_bytes_wait_for_the_timer():
     assert FLUSH_CYCLES / 16e6 == 4.096e-3
 
 
+@pytest.mark.parametrize("at", [0, 12 * BYTE, FLUSH_CYCLES, FLUSH_CYCLES + PACKET_CYCLES - 1, FLUSH_CYCLES + 20_000])
+def test_what_is_thrown_away_does_not_come_later(at):
+    bridge = UsbBridge()
+    feed(bridge, 12)
+    had = bridge.fetch(at) if at > 12 * BYTE else b""
+    assert bridge.discard(max(at, 11 * BYTE)) == 12 - len(had)
+    feed(bridge, 3, start=FLUSH_CYCLES + 30_000, first=100)
+    assert bridge.fetch(3 * FLUSH_CYCLES) == bytes([100, 101, 102])
+
+
 def test_more_than_96_bytes_do_not_wait():
     bridge = UsbBridge()
     at = feed(bridge, 96, spacing=100)

@@ -162,6 +162,15 @@ class SerialPort:
         self._received.clear()
         return data
 
+    def discard(self) -> int:
+        """Throw away everything that the board sent and nobody read, what lies in the USB bridge included.
+
+        Returns:
+            How many bytes that were.
+        """
+        lost = len(self.read())
+        return lost if self.bridge is None else lost + self.bridge.discard(self._chip.cycle)
+
     def peek(self) -> bytes:
         """Everything received so far, left in place."""
         self._fetch()

@@ -111,6 +111,15 @@ class UsbBridge:
             data += self._packets.popleft()[1]
         return bytes(data)
 
+    def discard(self, cycle: int) -> int:
+        """Throw away what the host does not have by `cycle`; returns how many bytes."""
+        lost = len(self.fetch(cycle)) + self._count + len(self._packet) + sum(len(data) for _, data in self._packets)
+        self._out, self._count, self._left = self._in, 0, 0
+        self._packet.clear()
+        self._packets.clear()
+        self._gives_up_at = None
+        return lost
+
     def next_delivery_cycle(self, cycle: int, byte_cycles: int) -> int:
         """First cycle from `cycle` on at which the host may have bytes, if the board sends one each `byte_cycles`."""
         self.advance(cycle)

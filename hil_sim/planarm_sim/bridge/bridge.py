@@ -195,7 +195,7 @@ class Bridge:
     def _reset(self, boot_s: float) -> None:
         uno = self._uno
         uno.run(cycles=max(uno.serial.idle_cycle - uno.cycle, 0))  # what is on the line is the old program's
-        self._lost += len(uno.serial.read())
+        self._lost += uno.serial.discard()
         uno.reset()
         self._boots_at_s = self._clock.now_s() + boot_s
 

@@ -103,6 +103,13 @@ class FaultyLine:
         self._received.clear()
         return data
 
+    def discard(self) -> int:
+        """Throw away everything that the board sent and nobody read; returns how many bytes."""
+        held = self._waiting[TO_HOST]
+        lost = len(self.read()) + len(held) + self._uno.serial.discard()
+        held.clear()
+        return lost
+
     def peek(self) -> bytes:
         """Everything that came through, left in place."""
         self.pump()

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from planarm.cli.scenes import tell_first_compile
-from planarm.errors import DeviceFault, EmulatorError, UsageError
+from planarm.errors import DeviceFault, EmulatorError
 from planarm.link.released_image import released_image
 from planarm.scene import Scene, load_scene
 from planarm_wire.boards import Board
@@ -30,8 +30,6 @@ def execute(options: argparse.Namespace) -> int:
 
     scene = load_scene(options.scene) if options.scene else None
     named = options.board or (scene.board.name if scene else "uno")
-    if scene and named != scene.board.name:
-        raise UsageError(f"--board {named}: {options.scene} is wired for {scene.board.name}; leave --board out")
     around = _arm_around(options, scene, BOARDS[named])
     talk = sys.stderr if options.json else sys.stdout
     try:

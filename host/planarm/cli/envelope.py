@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING, Any
 from planarm.cli.progress import progress
 from planarm.cli.scenes import chosen_scene, compile_first
 from planarm.cli.terminal import terminal
-from planarm.errors import SceneError
 from planarm.output import writing
 
 if TYPE_CHECKING:
@@ -31,9 +30,6 @@ def execute(options: argparse.Namespace) -> int:
     import numpy as np
 
     scene = chosen_scene(options)
-    if len(scene.joints) != 2:
-        problem = f"{list(scene.arm.link_lengths_cm)} given, maps of the workspace are of two links"
-        raise SceneError(scene.source, "arm.link_lengths_cm", problem)
     compile_first("planarm")
     from planarm.envelope.largest import MOST_TRIALS, largest_feed, largest_payload_kg
     from planarm.envelope.maps import envelope_maps

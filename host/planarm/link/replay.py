@@ -59,7 +59,7 @@ def replay(journal: Journal, image: Path | None = None) -> Replay:
         image: the flash image; None: the released one of the board that the journal names.
 
     Raises:
-        JournalError: nothing was sent, or to a board that is not known.
+        JournalError: nothing was sent.
         LinkError: the image cannot be loaded.
     """
     sent = [record for record in journal.records if record.kind is Kind.SENT]
@@ -67,12 +67,7 @@ def replay(journal: Journal, image: Path | None = None) -> Replay:
         raise JournalError("the journal has nothing that was sent, so there is nothing to replay")
     emulated = str(journal.about.get("port", "")).startswith("sim://")
     shift_s = 0.0 if emulated else LISTENS_S - sent[0].t_s
-    name = journal.about.get("board", "uno")
-    if name not in BOARDS:
-        raise JournalError(
-            f"the journal is of the board {name!r}, which this planarm does not know: {', '.join(BOARDS)}"
-        )
-    board = BOARDS[name]
+    board = BOARDS[journal.about.get("board", "uno")]
     line = SimTransport(image or released_image(board.name), board=board)
     for record in sent:
         cycle = round((record.t_s + shift_s) * TICKS_HZ)

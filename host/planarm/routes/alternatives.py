@@ -8,7 +8,7 @@ from itertools import islice
 
 import numpy as np
 
-from planarm.errors import NoPathError, SceneError, TimingError
+from planarm.errors import NoPathError, TimingError
 from planarm.model.kinematics import ElbowSide
 from planarm.routes.route import Route, no_path, smoothed_joint_route, tip_route
 from planarm.scene import JointSpaceSpec, Scene
@@ -70,11 +70,8 @@ def alternatives(
         told: told the share that is done.
 
     Raises:
-        SceneError, NoPathError: there is none at all; or the scene plans on a roadmap.
+        SceneError, NoPathError: there is none at all.
     """
-    if scene.planner.on_roadmap:
-        problem = f"{scene.planner.algorithm!r} draws its own configurations; --alternatives takes a planner of points"
-        raise SceneError(scene.source, "planner.algorithm", problem)
     spec = scene.joint_space or JointSpaceSpec(
         objective="tip_length", start_elbow=scene.arm.elbow, goal_elbow=scene.arm.elbow
     )

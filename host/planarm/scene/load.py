@@ -188,8 +188,7 @@ def with_planner(
     A new algorithm without `neighbours` takes its default neighbourhood.
 
     Raises:
-        SceneError: the algorithm is not known, or has no such neighbourhood, or does not plan so many links, or the
-            seed is negative.
+        SceneError: the algorithm is not known, or has no such neighbourhood, or the seed is negative.
     """
     before = scene.planner
     changed: dict[str, object] = {
@@ -204,14 +203,7 @@ def with_planner(
         changed["neighbours"] = neighbours
     elif changed["algorithm"] == before.algorithm:
         changed["neighbours"] = before.neighbours
-    planner = _planner(Table(scene.source, "planner", changed))
-    lengths = scene.arm.link_lengths_cm
-    if not planner.on_roadmap and len(lengths) != 2:
-        problem = (
-            f"{list(lengths)} given, {planner.algorithm!r} plans 2 links; {', '.join(ROADMAP_ALGORITHMS)} plan more"
-        )
-        raise SceneError(scene.source, "arm.link_lengths_cm", problem)
-    return replace(scene, planner=planner)
+    return replace(scene, planner=_planner(Table(scene.source, "planner", changed)))
 
 
 def with_space(scene: Scene, space: str | None) -> Scene:
