@@ -13,13 +13,14 @@ from dataclasses import dataclass, field, replace
 from itertools import count
 
 from planarm.errors import LinkError
+from planarm_wire.boards import Board
 from planarm_wire.codec import decode, encode, encoded_bytes
 from planarm_wire.errors import WireError
 from planarm_wire.framing import Frame, FrameDecoder, encode_frame
 from planarm_wire.messages import (
+    BOARDS,
     HOLD_CODE,
     JOINTS,
-    MIN_INTERVAL_TICKS,
     PROTOCOL_VERSION,
     QUEUE_BYTES,
     QUEUE_FRAME_BYTES,
@@ -428,18 +429,26 @@ class ModelLine:
         return lambda: take(byte)
 
 
-def motion(count: int, ticks: int = 32_000, seed: int = 1) -> tuple[Segment, ...]:
-    """A motion of `count` segments of `ticks` each, within the protocol's limits, different from one to the next."""
-    chance = random.Random(seed)
-    segments = [Segment(2 * ticks, (_move(chance, ticks), _move(chance, ticks))) for _ in range(count)]
+def motion(
+    count: int, ticks: int = 32_000, seed: int = 1, moving: int = 2, board: Board = BOARDS["uno"]
+) -> tuple[Segment, ...]:
+    """A motion of `count` segments of `ticks` each, within the protocol's limits, different from one to the next.
+
+    Of the board's joints `moving` move.
+    """
+    chance, least = random.Random(seed), board.min_interval_ticks
+    rest = (Move(0),) * (board.joints - moving)
+    segments = [
+        Segment(2 * ticks, (*(_move(chance, ticks, least) for _ in range(moving)), *rest)) for _ in range(count)
+    ]
     segments[-1] = replace(segments[-1], duration_flags=2 * ticks + 1)
     return tuple(segments)
 
 
-def _move(chance: random.Random, ticks: int) -> Move:
+def _move(chance: random.Random, ticks: int, least_ticks: int) -> Move:
     """A run that keeps half of the least interval clear at either end of the segment."""
-    margin = MIN_INTERVAL_TICKS // 2
-    most = min((ticks - 2 * margin) // (MIN_INTERVAL_TICKS + 20), 12)
+    margin = least_ticks // 2
+    most = min((ticks - 2 * margin) // (least_ticks + 20), 12)
     steps = chance.randrange(0, most + 1)
     steps_dir = 2 * steps + chance.randrange(2)
     if steps == 0:
@@ -448,5 +457,5 @@ def _move(chance: random.Random, ticks: int) -> Move:
     if steps == 1:
         return Move(steps_dir, first)
     room = min((ticks - 2 * margin - 20) // steps, 50_000)
-    interval = chance.randrange((MIN_INTERVAL_TICKS + 10) << 8, room << 8)
+    interval = chance.randrange((least_ticks + 10) << 8, room << 8)
     return Move(steps_dir, first, interval, chance.randrange(-(10 << 16) // steps, (10 << 16) // steps))

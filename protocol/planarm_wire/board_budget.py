@@ -29,9 +29,10 @@ SLICE_JOINT_TICKS: Final = 4_000
 
 LINE_LOAD: Final = 0.1
 """Share of the processor that the interrupts of a busy line take."""
-STRETCHED_TICKS: Final = 17_000
-"""What uno needs more for a segment that is stretched: with those of 0.5 and 1 ms it keeps up at one every 2.0 ms, and
-not at one every 1.7 ms."""
+STRETCHED_JOINT_TICKS: Final = 8_500
+"""What a board needs more for a segment that is stretched, for each joint of its image: with those of 0.5 and 1 ms uno
+keeps up at one every 2.0 ms; uno_four at one every 2.5 ms with two joints moving, 3.4 ms with three, 4.2 ms with four.
+"""
 LATEST_READ_TICKS: Final = 40_000
 """How long before its start a segment must be there."""
 LEAST_SHARE: Final = 0.05

@@ -12,7 +12,7 @@ from planarm.link.sim_transport import SimTransport
 from planarm.pipeline import plan_scene
 from planarm.scene import load_scene
 from planarm.streaming.plan_stream import options_for
-from planarm_wire.messages import STEP_PINS, State
+from planarm_wire.messages import BOARDS, STEP_PINS, State
 from planarm_wire.steps import duration_ticks
 from slow_line import SlowLine
 
@@ -69,6 +69,19 @@ def test_segments_of_half_a_millisecond_are_slowed_to_what_line_and_board_can_ta
     run = streamed(segments, bytes_s, 0.0)
     assert_kept_its_pace(segments, run)
     assert run[0].path_clock_percent == pytest.approx(min(25, 5 * bytes_s / 3_000), abs=4)
+
+
+@pytest.mark.parametrize("moving", [2, 3, 4])
+@pytest.mark.parametrize("ticks", [8_000, 16_000])
+def test_a_board_with_four_joints_reads_stretched_segments_in_time(moving, ticks):
+    """A good line, and segments as short as that: what slows them down is what the board needs to read them."""
+    board, told = BOARDS["uno_four"], []
+    segments = motion(300, ticks, moving=moving, board=board)
+    result = stream_plan(SimTransport(released_image(board.name), board=board), segments, told.append)
+    running = [one for one in told if one.state is not State.READY]
+    assert {one.state for one in running} == {State.RUNNING}, "it never starved"
+    assert {one.rate_percent for one in running} == {result.path_clock_percent}
+    assert result.path_clock_percent < 100
 
 
 def test_at_full_speed_they_would_run_dry(monkeypatch):

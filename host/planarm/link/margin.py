@@ -16,7 +16,7 @@ from planarm_wire.board_budget import (
     LEAST_SHARE,
     LINE_LOAD,
     STEP_INTERRUPT_TICKS,
-    STRETCHED_TICKS,
+    STRETCHED_JOINT_TICKS,
     work_ticks,
 )
 from planarm_wire.boards import Board
@@ -172,13 +172,14 @@ class _Supply:
         ticks_a_byte = TICKS_HZ / max(1.0, USABLE_SHARE * self._seen.bytes_s - QUESTIONS_BYTES_S)
         turn_ticks = TURNS * self._seen.round_trip_s * TICKS_HZ
         margin = SLICE_END_TICKS + PREPARED_TICKS * rate
+        stretched_ticks = 0 if percent == FULL_PERCENT else STRETCHED_JOINT_TICKS * self._board.joints
         line = board = 0.0
         running = 0
         for k in range(self._sent, len(self._needs)):
             begun = bisect_left(self._queued, self._queued[k + 1] - self._board.queue_bytes) - 1
             room = self.starts[begun] / rate if begun >= 0 else 0.0
             line = max(line, room + turn_ticks) + self._line_bytes[k] * ticks_a_byte
-            board = max(board, line) + self._work[k] + (0 if percent == FULL_PERCENT else STRETCHED_TICKS)
+            board = max(board, line) + self._work[k] + stretched_ticks
             path, before = board * rate, running
             while running < k and self.starts[running + 1] <= path:
                 running += 1
