@@ -104,7 +104,7 @@ def plan_scene(scene: Scene, notice: Notice, route: Route | None = None) -> Plan
     margin_cm = planning_margin_cm(scene)
     if scene.moving is not None:
         return plan_moving(scene, margin_cm, began_s, notice)
-    route = route or find_route(scene, margin_cm)
+    route = route or find_route(scene, margin_cm, notice)
     notice("plan", 0.4)
     motion = motion_along(scene, route, margin_cm, notice)
     notice("plan", 0.6)

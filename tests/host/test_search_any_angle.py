@@ -7,6 +7,8 @@ import numpy as np
 import pytest
 from scipy.sparse.csgraph import shortest_path
 
+from planarm.routes.route import find_route
+from planarm.search import optimum as optimum_search
 from planarm.search.costs import move_costs, norm, norm_planes
 from planarm.search.grid_search import find_path
 from planarm.search.lattice import make_lattice, near_room
@@ -124,6 +126,21 @@ def test_the_bound_is_infinite_only_without_any_chain():
     lattice = make_lattice(sealed, 6)
     row = 6 * lattice.width + 6
     assert lower_bound_cells(lattice, sealed.world, row, row + 13) == np.inf
+
+
+def test_a_search_for_the_optimum_that_takes_long_tells_how_far_it_is(monkeypatch):
+    scene = table1_scene(1)
+    scene = replace(scene, planner=planner("any_angle", 56, moves="proved"))
+    known = find_route(scene, scene.margin_cm)
+    told = []
+    monkeypatch.setattr(optimum_search, "LOOKS_A_TURN", 0)  # after each node that is settled
+    route = find_route(scene, scene.margin_cm, lambda stage, share: told.append((stage, share)))
+    assert route.path.points_cm.tolist() == known.path.points_cm.tolist()
+    shares = [share for _, share in told]
+    assert {stage for stage, _ in told} == {"optimum"}
+    assert len(shares) > 10
+    assert shares == sorted(shares)
+    assert 0.0 < shares[0] < shares[-2] < shares[-1] == 1.0
 
 
 def test_where_the_optimum_is_not_known_the_answer_says_so():

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from time import perf_counter
 
@@ -15,6 +16,7 @@ from planarm.search.costed import JOINT_TRAVEL, Price, time_price
 from planarm.search.diagnosis import Diagnosis, diagnose, diagnose_joints
 from planarm.search.grid_search import find_path
 from planarm.search.joint_space import SIDES, JointRoute, find_joint_route, made_route, tip_points_cm
+from planarm.search.optimum import Told
 from planarm.search.path import Path
 from planarm.search.result import SearchResult, SearchStatus
 from planarm.smoothing.joint_blend import blend_poses
@@ -24,6 +26,11 @@ from planarm.workspace.check_task import check_task
 from planarm.workspace.free_map import FreeMap, RegionMap, build_free_map, tip_map
 from planarm.workspace.joint_proof import joint_world
 from planarm.workspace.world import FREE, elbow_sides
+
+Notice = Callable[[str, float], None]
+"""Told the stage and the share of it that is done."""
+OPTIMUM = "optimum"
+"""The stage in which the any-angle optimum is looked for, where that takes long."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,13 +51,14 @@ class Route:
     """In what the path is less than was asked for; empty when in nothing."""
 
 
-def find_route(scene: Scene, margin_cm: float) -> Route:
+def find_route(scene: Scene, margin_cm: float, notice: Notice | None = None) -> Route:
     """Search as the scene says, and smooth.
 
     Args:
         scene: what to do; with a planner on a roadmap there, with a table [joint_space] in joint space, else in tip
             space on each allowed elbow side.
         margin_cm: least distance of a link's centre line to an obstacle.
+        notice: told how far a search for the any-angle optimum is.
 
     Raises:
         SceneError, NoPathError: there is no path; the message, `advice` and `fields` say why and what would help.
@@ -58,21 +66,25 @@ def find_route(scene: Scene, margin_cm: float) -> Route:
     """
     if scene.planner.on_roadmap:
         return roadmap_route(scene, margin_cm)
-    return joint_route(scene, margin_cm, scene.joint_space) if scene.joint_space else tip_route(scene, margin_cm)
+    if scene.joint_space:
+        return joint_route(scene, margin_cm, scene.joint_space)
+    return tip_route(scene, margin_cm, notice)
 
 
-def tip_route(scene: Scene, margin_cm: float) -> Route:
+def tip_route(scene: Scene, margin_cm: float, notice: Notice | None = None) -> Route:
     """Return the route along the shortest path of the tip on any allowed elbow side; errors as `find_route`."""
     found: list[tuple[FreeMap, Path, SearchResult, float]] = []
     bounds_cm = []
-    price = search_price(scene)
-    for side in elbow_sides(scene.arm):
+    price, sides = search_price(scene), elbow_sides(scene.arm)
+    for k, side in enumerate(sides):
         try:
             free_map = build_free_map(scene, margin_cm, side, whole_cells=scene.planner.moves == "proved")
             check_task(scene, free_map)
         except SceneError:  # on this side; told below when it is so on all sides
             continue
-        result = find_path(free_map, scene.task.start_cm, scene.task.goal_cm, scene.planner, price)
+        result = find_path(
+            free_map, scene.task.start_cm, scene.task.goal_cm, scene.planner, price, _told(notice, k, len(sides))
+        )
         if result.path is not None:
             cost = result.path.length_cm if result.cost is None else result.cost
             found.append((free_map, result.path, result, cost))
@@ -82,6 +94,11 @@ def tip_route(scene: Scene, margin_cm: float) -> Route:
     free_map, path, result, _ = min(found, key=lambda one: one[3])
     smooth = smoothed(scene, free_map, path)
     return Route(free_map, path, smooth, result.plan_s, bound_cm=min(bounds_cm), note=result.note)
+
+
+def _told(notice: Notice | None, number: int, of: int) -> Told | None:
+    """Return what a search of so many takes to tell how far it is."""
+    return None if notice is None else lambda share: notice(OPTIMUM, (number + share) / of)
 
 
 def search_price(scene: Scene) -> Price | None:

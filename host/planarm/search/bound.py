@@ -10,7 +10,7 @@ from planarm.scene import PlannerSpec
 from planarm.search.endpoints import JOIN_CELLS, Endpoint
 from planarm.search.lattice import make_lattice, node_at, nodes_cm
 from planarm.search.legal import CELLS, PROOF, Lattice
-from planarm.search.optimum import BORDER, MOST_ASKED, MOST_NODES, lower_bound_cells, optimal_nodes
+from planarm.search.optimum import BORDER, MOST_ASKED, MOST_NODES, Told, lower_bound_cells, optimal_nodes
 from planarm.search.path import Path
 from planarm.workspace.free_map import FreeMap
 
@@ -28,7 +28,7 @@ ASIDE: Final = JOIN_CELLS + 3
 
 
 def optimal_path(
-    free_map: FreeMap, path: Path, start: Endpoint, goal: Endpoint, planner: PlannerSpec
+    free_map: FreeMap, path: Path, start: Endpoint, goal: Endpoint, planner: PlannerSpec, told: Told | None = None
 ) -> tuple[Path, str]:
     """Return the shortest chain of legs in sight between the nodes of start and goal, and a note where it is not known.
 
@@ -40,6 +40,7 @@ def optimal_path(
         start: where it begins; only from node to node there is an exact answer.
         goal: where it ends.
         planner: moves "cells" or "proved".
+        told: told the share that is done, of a search that takes long.
     """
     if len(path.points_cm) == 1:
         return path, ""
@@ -49,7 +50,7 @@ def optimal_path(
             f"{_INEXACT}: start or goal is no node; put both on multiples of {_CELL}.",
         )
     lattice = make_lattice(free_map, BORDER)
-    nodes = _better(lattice, free_map, path, (start, goal), planner, MOST_ASKED)
+    nodes = _better(lattice, free_map, path, (start, goal), planner, MOST_ASKED, told)
     if nodes is None:
         return path, f"{_INEXACT}: a shorter one may pass more than {MOST_ASKED:,} nodes; take a larger {_CELL}."
     return (Path.through(nodes_cm(lattice, nodes), free_map.elbow) if len(nodes) else path), ""
@@ -84,11 +85,12 @@ def _better(
     ends: tuple[Endpoint, Endpoint],
     planner: PlannerSpec,
     most_nodes: int,
+    told: Told | None = None,
 ) -> NDArray[np.int64] | None:
     first, last = (node_at(lattice, end.column, end.row) for end in ends)
     legal = PROOF if planner.moves == "proved" else CELLS
     known_cells = path.length_cm / free_map.cell_cm
-    return optimal_nodes(lattice, free_map.world, legal, (first, last), known_cells, most_nodes)
+    return optimal_nodes(lattice, free_map.world, legal, (first, last), known_cells, most_nodes, told)
 
 
 def _join_cm(free_map: FreeMap, end: Endpoint) -> float:

@@ -20,6 +20,7 @@ from planarm.search.draw import draw_subset
 from planarm.search.endpoints import ON_NODE_CM, Endpoint, endpoint
 from planarm.search.lattice import make_lattice, make_moves, node_at, nodes_cm, open_room
 from planarm.search.legal import CELLS, NODES, PROOF, ROOM, WHOLE_ROOM, Lattice
+from planarm.search.optimum import Told
 from planarm.search.path import Path
 from planarm.search.result import SearchResult, SearchStatus
 from planarm.search.stencils import DRAWN, Offsets, primitive, stencil
@@ -42,13 +43,19 @@ FEW_MOVES: Final = 8
 
 
 def find_path(
-    free_map: FreeMap, start_cm: Point, goal_cm: Point, planner: PlannerSpec, price: Price | None = None
+    free_map: FreeMap,
+    start_cm: Point,
+    goal_cm: Point,
+    planner: PlannerSpec,
+    price: Price | None = None,
+    told: Told | None = None,
 ) -> SearchResult:
     """Search a shortest path of the end effector from start to goal on the map's nodes.
 
     A start or goal that is no node is joined to the nearest free node that a proved straight move leads to, whatever
     `planner.moves` says. With a price the cheapest path is searched instead, by the algorithms in PRICED; it is not
-    pulled taut, which would shorten it and make it dearer.
+    pulled taut, which would shorten it and make it dearer. A search for the any-angle optimum that takes long tells
+    `told` the share that is done.
 
     Raises:
         ValueError: the planner's algorithm has no such neighbourhood.
@@ -79,7 +86,7 @@ def find_path(
         if planner.moves == "nodes" or priced:
             note = NO_OPTIMUM
         else:
-            path, note = optimal_path(free_map, path, start, goal, planner)
+            path, note = optimal_path(free_map, path, start, goal, planner, told)
             exact = not note
     took_s = perf_counter() - begin_s
     bound_cm = path.length_cm if exact else path_bound_cm(free_map, path, start, goal, planner)

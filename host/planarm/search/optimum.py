@@ -14,6 +14,7 @@ on a shorter one. Between those few nodes A* looks at all legs in sight. What it
 it finds nothing, the known one is.
 """
 
+from collections.abc import Callable
 from math import cos, hypot, inf
 from typing import Final
 
@@ -48,6 +49,12 @@ MOST_NODES: Final = 3000
 MOST_ASKED: Final = 20_000
 """Nor between more than these when it is asked for: that may take two minutes."""
 
+Told = Callable[[float], None]
+"""Told the share of a search that is done, 0 to 1."""
+
+LOOKS_A_TURN: Final = 1_000_000
+"""After so many legs looked at, a fraction of a second, the search tells how far it is."""
+
 
 def excess() -> float:
     """Return how much longer than a straight line a way on the stencil with 80 nodes is in the open, at most."""
@@ -76,7 +83,13 @@ def lower_bound_cells(lattice: Lattice, world: ArmWorld, start: int, goal: int, 
 
 
 def optimal_nodes(
-    lattice: Lattice, world: ArmWorld, legal: int, ends: tuple[int, int], known_cells: float, most_nodes: int
+    lattice: Lattice,
+    world: ArmWorld,
+    legal: int,
+    ends: tuple[int, int],
+    known_cells: float,
+    most_nodes: int,
+    told: Told | None = None,
 ) -> Ints | None:
     """Return the shortest chain of legs in sight, empty when none is shorter than `known_cells`; None if it takes long.
 
@@ -87,6 +100,7 @@ def optimal_nodes(
         ends: a free node at the start, and one at the goal.
         known_cells: length of a known path; the longer it is, the longer this takes.
         most_nodes: with more nodes that a shorter path may pass, the answer is None.
+        told: told the share of these nodes that is settled, now and then; it often ends before all are.
     """
     start, goal = ends
     near = near_room(lattice, 1)
@@ -101,9 +115,16 @@ def optimal_nodes(
     y, x = np.divmod(nodes, lattice.width)
     goal_x, goal_y = goal % lattice.width, goal // lattice.width
     ahead = np.maximum(to_goal[nodes], np.hypot(x - goal_x, y - goal_y))
-    before = _search(
-        lattice, world, legal, x.astype(float), y.astype(float), ahead, places[start], places[goal], known_cells
-    )
+    x_cells, y_cells = x.astype(float), y.astype(float)
+    g, before, closed = np.full(len(nodes), inf), np.full(len(nodes), NONE), np.zeros(len(nodes), np.bool_)
+    g[places[start]] = 0.0
+    state, turns, slow = (g, before, closed), 1 + LOOKS_A_TURN // len(nodes), False
+    while not _search(lattice, world, legal, x_cells, y_cells, ahead, places[goal], known_cells, state, turns):
+        slow = True
+        if told is not None:
+            told(float(closed.mean()))
+    if slow and told is not None:
+        told(1.0)
     chain = [places[goal]]
     while before[chain[-1]] != NONE:
         chain.append(int(before[chain[-1]]))
@@ -118,21 +139,24 @@ def _search(
     x: Floats,
     y: Floats,
     ahead: Floats,
-    start: int,
     goal: int,
     known_cells: float,
-) -> Ints:
-    """A* over all legs in sight between the points (x, y); `ahead` bounds the way to the goal. Return predecessors."""
+    state: tuple[Floats, Ints, NDArray[np.bool_]],
+    turns: int,
+) -> bool:
+    """Go on with A* over all legs in sight between the points (x, y); `ahead` bounds the way to the goal.
+
+    Settle so many points at most, in `state`: costs, predecessors, what is settled. Return whether that was all.
+    """
     count = x.size
-    g, before, closed = np.full(count, inf), np.full(count, NONE), np.zeros(count, np.bool_)
-    g[start] = 0.0
-    while True:
+    g, before, closed = state
+    for _ in range(turns):
         node, lowest = NONE, known_cells - SHORTER_CELLS
         for i in range(count):
             if not closed[i] and g[i] + ahead[i] < lowest:
                 node, lowest = i, g[i] + ahead[i]
         if node in (NONE, goal):
-            return before
+            return True
         closed[node] = True
         for i in range(count):
             through = g[node] + leg_cells(x[node], y[node], x[i], y[i])
@@ -140,3 +164,4 @@ def _search(
                 continue
             if in_sight(lattice, world, legal, x[node], y[node], x[i], y[i]):
                 g[i], before[i] = through, node
+    return False
