@@ -170,6 +170,8 @@ void pass() {
     serve_hold();
     serve_rest();
     hal::journal_serve();
+    // An emergency that comes just now is told by the next STATUS: this one has neither fault nor the last
+    // steps.
     if (hal::serial_can_send() && session::send_reply()) return;
     if (session::is_busy()) {
         session::advance();

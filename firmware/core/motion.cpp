@@ -304,6 +304,8 @@ void Motion::reset() {
     step_engine::reset();
     set_override(100);
     executed_segments = 0;
+    urgent = false;
+    turn = 0;
     clear();
 }
 

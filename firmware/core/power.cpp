@@ -34,10 +34,7 @@ void reset() {
     at.counted_ticks = clock::pass_ticks();
 }
 
-void configure() {
-    hal::set_enable_active_high(settings::has_option(settings::ENABLE_ACTIVE_HIGH));
-    hal::drivers_enable(false);
-}
+void configure() { hal::set_enable_active_high(settings::has_option(settings::ENABLE_ACTIVE_HIGH)); }
 
 void energise() {
     hal::journal_mark(true);

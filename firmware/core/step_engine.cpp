@@ -248,6 +248,8 @@ void stop() {
     step_missed = 0;
 }
 
+// Locked for up to 80 cycles, which a step that comes meanwhile can bear: joints that may stop dead step far
+// slower than the least interval.
 bool freeze(uint32_t& now_ticks) {
     uint8_t on;
     uint16_t counter;

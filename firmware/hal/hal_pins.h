@@ -6,7 +6,7 @@
 
 namespace hal {
 
-// ENABLE is active low until told otherwise; outlives a reset.
+// ENABLE is active low until told otherwise; outlives a reset. Releases the drivers.
 void set_enable_active_high(bool active_high);
 
 // Energises or releases the drivers.

@@ -16,15 +16,21 @@ import pytest
 from firmware_board import LEAD_TICKS, WAKE_TICKS, Board, EmulatedFirmware, run_of, segment_of
 from planarm_sim.cpu import registers as reg
 from planarm_sim.cpu.values import ResetCause
+from planarm_wire.codec import encoded_bytes
 from planarm_wire.messages import (
     EMERGENCY_CODE,
     EMERGENCY_REPEATS,
+    ENABLE_PIN,
+    JOINTS,
     STEP_PINS,
     TICKS_HZ,
     WATCHDOG_MS,
     Clear,
+    Config,
     Enable,
+    PinMap,
     Reset,
+    Result,
     Segments,
     Start,
     State,
@@ -32,6 +38,7 @@ from planarm_wire.messages import (
 )
 
 BOOT_CYCLES = 600_000
+BYTE_CYCLES = 640
 MARK_CYCLES = 4 * 54_400  # four bytes of 3.4 ms
 JUMP_TO_ITSELF = b"\xff\xcf"  # rjmp .-2
 RECORD_BYTES, RECORDS = 4, 128
@@ -185,3 +192,37 @@ def test_marks_wander_through_the_eeprom(emulated_firmware: EmulatedFirmware, si
     assert sum(writes.values()) == 2 * rounds
     assert max(writes.values()) <= math.ceil(2 * rounds / RECORDS)
     assert RECORDS * CELL_WRITES == 12_800_000, "what hal/uno/journal.h tells"
+
+
+def test_what_a_boot_loader_left_in_timer_0_is_no_byte(emulated_firmware: EmulatedFirmware) -> None:
+    # The receive ring's indices and counts are in registers of timer 0, which a boot loader may have used.
+    board = Board(emulated_firmware)
+    uno = emulated_firmware.uno
+    uno.reset()
+    for address, value in ((reg.OCR0A, 5), (reg.OCR0B, 2), (reg.TCNT0, 9), (reg.GPIOR2, 77), (reg.TCCR0B, 1)):
+        uno._chip.poke_data(address, bytes([value]))
+    uno.run(cycles=BOOT_CYCLES)
+    board.forget_replies()
+    board.hello()
+    status = board.ask()
+    assert (status.overruns, status.crc_errors, status.ring_full) == (0, 0, 0)
+
+
+def test_drivers_are_released_by_their_new_polarity_before_the_eeprom_is_ready(
+    emulated_firmware: EmulatedFirmware,
+) -> None:
+    # CONFIG right behind RELEASE, whose mark is still being written: 3.4 ms a byte.
+    board = Board(emulated_firmware)
+    board.hello()
+    board.ask(Enable(1))
+    board.run(WAKE_TICKS)
+    board.edges.clear()
+    board.send(Enable(0))
+    active_high = Config(PinMap.OWN, JOINTS, 0, 1, 0, 160_000, 0, (160_000,) * JOINTS)
+    board.send(active_high)
+    sent = board.now + (encoded_bytes(Enable(0)) + encoded_bytes(active_high)) * BYTE_CYCLES
+    board.run(400_000)
+    assert board.ask().refusal is Result.OK
+    released, driven_low = [edge for edge in board.edges if edge.pin == ENABLE_PIN]
+    assert (released.level, driven_low.level) == (1, 0)
+    assert driven_low.tick - sent < 20_000

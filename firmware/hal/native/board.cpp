@@ -177,10 +177,13 @@ void write_dir(uint8_t joint, bool positive) { set_pin(uno.dirs[joint], positive
 
 using board::uno;
 
-void set_enable_active_high(bool active_high) { uno.enable_active_high = active_high; }
-
 void drivers_enable(bool on) {
     board::set_pin(uno.enable_high, on == uno.enable_active_high, planarm::wire::ENABLE_PIN);
+}
+
+void set_enable_active_high(bool active_high) {
+    uno.enable_active_high = active_high;
+    drivers_enable(false);
 }
 
 uint8_t inputs() { return uno.inputs; }

@@ -33,6 +33,7 @@ constexpr uint8_t pull_ups_in(hal::Port port) {
 constexpr uint8_t OUTPUTS_B = outputs_in(hal::Port::B);
 constexpr uint8_t OUTPUTS_D = outputs_in(hal::Port::D);
 static_assert(outputs_in(hal::Port::C) == 0, "port C has inputs only");
+static_assert(mask_if(hal::Port::B, wire::ENABLE_PIN) != 0, "port D is written whole after ENABLE");
 constexpr uint8_t PULL_UPS_B = pull_ups_in(hal::Port::B);
 constexpr uint8_t PULL_UPS_C = pull_ups_in(hal::Port::C);
 constexpr uint8_t PULL_UPS_D = pull_ups_in(hal::Port::D);
@@ -41,9 +42,12 @@ constexpr uint8_t PULL_UPS_D = pull_ups_in(hal::Port::D);
 
 // Runs before main and before memory is set up: drivers released (ENABLE at its level before it becomes an
 // output), STEP and DIR low, pull-ups on the inputs, no watchdog left over from before the reset (ATmega328P
-// datasheet, 10.9.2).
+// datasheet, 10.9.2). A reset in the middle of a write to the EEPROM leaves open whether that goes on
+// (7.6.3).
 extern "C" void early_pins() __attribute__((naked, used, section(".init3")));
 void early_pins() {
+    while ((EECR & _BV(EEPE)) != 0) {
+    }
     EEAR = hal::POLARITY_ADDRESS;
     EECR = _BV(EERE);
     if (EEDR != hal::ACTIVE_HIGH) hal::write_pin(wire::ENABLE_PIN, true);

@@ -49,10 +49,8 @@ __attribute__((naked, noinline)) Fixed48 multiply(uint32_t, uint16_t) {
         )");
 }
 
-namespace {
-
 // a b / 2^16, as `multiply` returns it: a in r25 to r22, b in r21 to r18. The products with b's halves are
-// added.
+// added. Its name is for the assembler.
 extern "C" __attribute__((naked, noinline, used)) void planarm_scale() {
     __asm__ __volatile__(
         R"(
@@ -89,8 +87,6 @@ extern "C" __attribute__((naked, noinline, used)) void planarm_scale() {
         ret
         )" ::[multiply] "i"(multiply));
 }
-
-}  // namespace
 
 __attribute__((naked, noinline)) uint32_t multiply_saturated(uint32_t, uint16_t) {
     __asm__ __volatile__(

@@ -16,12 +16,14 @@ namespace {
 bool enable_active_high;
 }
 
+void drivers_enable(bool on) { write_pin(wire::ENABLE_PIN, on == enable_active_high); }
+
+// The EEPROM may be busy for 3.4 ms: the pin first.
 void set_enable_active_high(bool active_high) {
     enable_active_high = active_high;
+    drivers_enable(false);
     keep_enable_polarity(active_high);
 }
-
-void drivers_enable(bool on) { write_pin(wire::ENABLE_PIN, on == enable_active_high); }
 
 uint8_t inputs() {
     uint8_t bits = read_pin(wire::STOP_PIN) ? STOP_INPUT_OPEN : 0;

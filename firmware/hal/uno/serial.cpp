@@ -22,7 +22,7 @@ static_assert((RX_RING_BYTES & (RX_RING_BYTES - 1)) == 0, "ring indices wrap by 
 uint8_t ring[RX_RING_BYTES];  // written by the interrupt
 
 // Received bytes and bytes taken, the emergency bytes in a row, and bytes lost in the USART, all modulo 256,
-// where IN and OUT reach them: timer 0 stands still.
+// where IN and OUT reach them: timer 0 stands still. A boot loader may have left anything there.
 #define RING_HEAD GPIOR2
 #define RING_TAIL OCR0A
 #define EMERGENCY_RUN OCR0B
@@ -43,6 +43,11 @@ volatile uint8_t sending_left;
 }  // namespace
 
 void serial_init() {
+    TCCR0B = 0;
+    RING_HEAD = 0;
+    RING_TAIL = 0;
+    EMERGENCY_RUN = 0;
+    OVERRUNS = 0;
     UBRR0 = BAUD_DIVIDER - 1;
     UCSR0A = _BV(U2X0);
     UCSR0C = _BV(UCSZ01) | _BV(UCSZ00);
@@ -95,7 +100,8 @@ void emergency_clear() { emergencies_cleared = emergencies_told; }
 
 // Cycles with entry and jump: 40 for a byte stored or one that finds no room, 44 after an overrun, 37 for a
 // hold, 42 for an emergency byte that is not the last. A byte comes every 640
-// at the fastest. After the last emergency byte both pins are low 44 cycles after the interrupt's beginning.
+// at the fastest. Bytes lost before a hold or an emergency byte are not counted. After the last emergency
+// byte both pins are low 44 cycles after the interrupt's beginning.
 ISR(USART_RX_vect, ISR_NAKED) {
     __asm__ __volatile__(
         R"(
