@@ -12,6 +12,7 @@ from firmware_board import (
     LEAD_TICKS,
     Board,
     Delays,
+    EmulatedFirmware,
     Firmware,
     NativeFirmware,
     Schedule,
@@ -396,3 +397,31 @@ class TestHostileStream:
 def replace_last(segment: Segment) -> Segment:
     """The segment, marked as its motion's last."""
     return replace(segment, duration_flags=segment.duration_flags | 1)
+
+
+def test_a_fault_in_motion_counts_the_segments_that_its_steps_are_of(emulated_firmware: EmulatedFirmware) -> None:
+    # A pass may last longer than a step: what ended since it began is executed, too.
+    steps, interval = 40, 400
+    duration = steps * interval
+    board = Board(emulated_firmware)
+    board.get_ready()
+    segment = segment_of(duration, run_of(steps, first=0, interval=interval))
+    for _ in range(8):
+        board.ask(Segments(0, 0, 0, (segment,) * 4))
+    board.send(Start(LEAD_TICKS))
+    board.run(LEAD_TICKS + 40_000)
+    uno, seq = emulated_firmware.uno, board.seq
+    moving = uno.snapshot()
+    for phase in range(0, duration, 331):
+        uno.restore(moving)
+        board.forget_replies()
+        board.seq = seq
+        board.run(phase)
+        board.send(Segments(0, 0, 0, (segment_of(0),)))
+        board.run(50_000)
+        status = board.ask()
+        assert status.fault is Fault.BAD_SEGMENT
+        made = status.ledger.position_usteps[0]
+        # Behind its last step a segment goes on for an interval.
+        whole = {made // steps, (made - 1) // steps}
+        assert status.ledger.executed_segments in whole, f"{made} steps, {phase} ticks"
