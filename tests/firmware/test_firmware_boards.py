@@ -167,8 +167,8 @@ def test_all_joints_at_their_rate_on_a_saturated_line(
 ) -> None:
     # Valid frames without a gap, for a quarter of a second or ten, at the board's least interval.
     interval = BOARDS[name].min_interval_ticks
-    duration = sized(8 * SLICE_TICKS, 10 * TICKS_HZ // 8)
-    motion = steady(name, interval, 8 * duration / TICKS_HZ, duration)
+    duration, count = sized(8 * SLICE_TICKS, 10 * TICKS_HZ // 20), sized(8, 20)
+    motion = steady(name, interval, count * duration / TICKS_HZ, duration)
     firmware = emulated(name)
     board = Board(firmware)
     board.get_ready()
@@ -177,7 +177,7 @@ def test_all_joints_at_their_rate_on_a_saturated_line(
     board.ask(Start(LEAD_TICKS))
     message = Query() if content == "queries" else Segments(0, 0, 0, (motion[0],))
     frame = encode_frame(board.seq - 1, *encode(message))
-    end = board.now + LEAD_TICKS + 8 * duration + 100_000
+    end = board.now + LEAD_TICKS + len(motion) * duration + 100_000
     while board.now < end:
         while firmware.uno.serial.pending < HOST_WINDOW_BYTES:
             board.receive(frame)
