@@ -251,6 +251,7 @@ bool Motion::retire(bool& ends_motion) {
 void Motion::clear() {
     queue::clear();
     queued_path_ticks = 0;
+    need_ticks = 0;  // a motion does not starve by the last one's need before it has read its own
     queue_end.complete = false;
     running = begun = reading = in_segment = segment_last = filling = frozen = starved = false;
     wish = Wish::GO;

@@ -369,7 +369,7 @@ class Stream:
 
     def _wanted_from(self) -> int:
         """Return how many segments have to be executed before the device is to have the next."""
-        if self._options.ahead_s is None or not self._options.allowances:
+        if self._options.ahead_s is None or not self._options.allowances or self._status.state is State.STARVED:
             return 0
         running = self._options.allowances[self._executed : self._executed + LOOK_AHEAD]
         need_ticks = max((allowance.need_ticks for allowance in running), default=0.0)
