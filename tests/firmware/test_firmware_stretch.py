@@ -28,7 +28,9 @@ from planarm_wire.codec import encoded_bytes
 from planarm_wire.messages import (
     HOLD_CODE,
     JOINTS,
+    NEED_UNIT_TICKS,
     QUEUE_FRAME_BYTES,
+    STARVING_TICKS,
     Config,
     Enable,
     Fault,
@@ -229,6 +231,26 @@ def test_at_full_rate_the_schedule_is_the_plan_bit_by_bit(firmware: Firmware) ->
     for joint in range(JOINTS):
         planned = [begin + tick for tick, _ in Schedule.of(FAST.segments).steps[joint]]
         assert player.board.rises(joint) == planned
+
+
+def test_a_motion_does_not_starve_by_the_need_of_the_one_before(firmware: Firmware) -> None:
+    # Stopped at full rate, the arm goes on from rest with less road than it needed then, and more than it needs now.
+    player = Player(firmware, FAST)
+    player.start()
+    player.play_until(player.board.now + 14 * SEGMENT_TICKS)
+    needed = max(head[2] for head in FAST.heads[:14]) * NEED_UNIT_TICKS
+    player.board.send(Stop(1))
+    player.play_until(player.board.now + 10**8, State.READY, feed=False)
+    road, read_ahead = 12, 4
+    needs_now = FAST.heads[read_ahead][2] * NEED_UNIT_TICKS + STARVING_TICKS
+    assert needs_now < (road - read_ahead) * SEGMENT_TICKS < road * SEGMENT_TICKS < needed + STARVING_TICKS
+    for segment, head in zip(FAST.segments[:road], FAST.heads, strict=False):
+        player.board.send(Segments(*head, (segment,)))
+        player.board.run(6000)
+    player.board.send(Start(LEAD_TICKS))
+    player.board.run(LEAD_TICKS + SEGMENT_TICKS + 20_000)
+    status = player.board.ask_now()
+    assert status.state is State.RUNNING
 
 
 def test_a_silent_host_brings_the_arm_to_rest_on_the_path(firmware: Firmware) -> None:
