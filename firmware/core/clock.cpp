@@ -34,6 +34,8 @@ uint32_t now() {
 
 void begin_pass() { begun_ticks = now(); }
 
+void begin_pass_at(uint32_t ticks) { begun_ticks = ticks; }
+
 uint32_t pass_ticks() { return begun_ticks; }
 
 int32_t ticks_until(uint32_t ticks) { return static_cast<int32_t>(ticks - begun_ticks); }

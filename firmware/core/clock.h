@@ -21,6 +21,8 @@ uint32_t extend(uint16_t counter);
 // Looks at the clock for a pass of the main program: what follows are that moment's, for all that the pass
 // does or until it looks again.
 void begin_pass();
+// The same for a time that was told.
+void begin_pass_at(uint32_t ticks);
 uint32_t pass_ticks();
 // Ticks until then; below 0 when that is past.
 int32_t ticks_until(uint32_t ticks);

@@ -90,7 +90,8 @@ Progress serve() {
     const bool hit = inputs::is_hit(at.order.joint);
     const bool there = at.phase == Phase::BACK ? !hit : hit;
     if (!there) return feed(at) ? Progress::GOING : Progress::FAILED;
-    step_engine::stop();
+    step_engine::end_steps();
+    step_engine::drop_runs();
     if (at.phase == Phase::TOUCH) {
         at.phase = Phase::NONE;
         return Progress::DONE;

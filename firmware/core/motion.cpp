@@ -296,6 +296,7 @@ bool Motion::may_freeze() const {
     const bool starving = wish == Wish::GO && is_starving(slice.end_path(), wire::STARVING_TICKS);
     if (wish == Wish::GO && !starving) return Progress::GOING;
     if (!may_freeze() || !step_engine::freeze(frozen_ticks)) return Progress::GOING;
+    clock::begin_pass_at(frozen_ticks);
     frozen = true;
     starved = starving;
     return starving ? Progress::STARVED : Progress::AT_REST;
@@ -334,20 +335,25 @@ Progress Motion::serve() {
     begun = begun || clock::has_come(begin_ticks);
     if (!step_engine::serve()) return Progress::MISSED;
     bool ends_motion = false;
-    if (retire(ends_motion)) {
-        clear();
-        return ends_motion ? Progress::DONE : Progress::UNDERRUN;
+    Progress progress = Progress::GOING;
+    while (!retire(ends_motion)) {
+        if (progress != Progress::GOING) return progress;  // what ended before the clock stood is executed
+        progress = freeze_if_due();
+        if (progress != Progress::GOING) continue;
+        prepare();  // last, as it takes longest: the pass has one time
+        return progress;
     }
-    const Progress progress = freeze_if_due();
-    if (progress == Progress::GOING) prepare();  // last, as it takes longest: the pass has one time
-    return progress;
+    clear();
+    return ends_motion ? Progress::DONE : Progress::UNDERRUN;
 }
 
 void Motion::halt() {
+    const bool is_timely = running && !frozen && !step_engine::missed();
+    clock::begin_pass();                             // a pass that writes the EEPROM may be long
+    clock::begin_pass_at(step_engine::end_steps());  // the segments whose steps have risen are executed
     bool ends_motion;
-    clock::begin_pass();  // what ended in this pass is executed, too
-    if (running && !frozen && !step_engine::missed()) retire(ends_motion);
-    step_engine::stop();
+    if (is_timely) retire(ends_motion);
+    step_engine::drop_runs();
     clear();
 }
 

@@ -229,18 +229,23 @@ bool serve() {
     return step_missed == 0;
 }
 
-void stop() {
+uint32_t end_steps() {
     uint8_t on;
+    uint16_t last;
     {
         const hal::InterruptLock lock;
         on = step_missed | hal::step_interrupts_on();
-        hal::steps_off();
+        last = hal::end_steps();
     }
     hal::wait_step_high();
     for_each_joint([&](auto joint) {
         finish_pulse<joint.NUMBER>();
         cut_active<joint.NUMBER>(on, 0);
     });
+    return clock::extend(last);
+}
+
+void drop_runs() {
     for (uint8_t joint = 0; joint < wire::JOINTS; ++joint) {
         take_back(joint);
         clear(joint);

@@ -80,11 +80,14 @@ void set_dir_inverted(uint8_t joint, bool inverted);
 // Starts idle joints whose next run is due soon. False when a step came too late.
 bool serve();
 
-// True from a missed step to the stop that follows.
+// True from a missed step until its run is dropped.
 inline bool missed() { return step_missed != 0; }
 
-// Stops all joints at once and drops all runs. Steps that have risen are counted.
-void stop();
+// Stops all joints at once and counts the steps that have risen: those up to the tick that is returned.
+uint32_t end_steps();
+
+// Drops all runs that are left; all joints must be stopped.
+void drop_runs();
 
 // Puts all joints to rest in the middle of what they do, at the tick returned in `now_ticks`; runs keep their
 // distance to that tick. False, and nothing is changed, while a step is about to rise or a pulse is high.

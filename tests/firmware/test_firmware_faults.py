@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import replace
 
 import pytest
@@ -41,6 +42,7 @@ from planarm_wire.messages import (
     Start,
     State,
     Status,
+    Stop,
 )
 
 LEAST, MOST = MIN_INTERVAL_TICKS, MAX_INTERVAL_TICKS
@@ -422,7 +424,69 @@ def test_a_fault_in_motion_counts_the_segments_that_its_steps_are_of(emulated_fi
         status = board.ask()
         assert status.fault is Fault.BAD_SEGMENT
         made = status.ledger.position_usteps[0]
-        # Behind its last step a segment goes on for an interval. A step that rises between the look at the clock and
-        # the end of all steps is counted; the segment that ended with it is not.
-        whole = {made // steps, (made - 1) // steps} | ({made // steps - 1} if made % steps == 1 else set())
-        assert status.ledger.executed_segments in whole, f"{made} steps, {phase} ticks"
+        # A segment is executed as soon as the next one's first step has risen, no sooner.
+        assert status.ledger.executed_segments == (made - 1) // steps, f"{made} steps, {phase} ticks"
+
+
+def test_a_fault_counts_a_segment_from_the_tick_on_that_its_steps_end(emulated_firmware: EmulatedFirmware) -> None:
+    # The motion begins later and later, so that its steps end all around a segment's end, there at every tick.
+    steps, interval = 41, 400
+    board = Board(emulated_firmware)
+    board.get_ready()
+    segment = segment_of(steps * interval, run_of(steps, first=0, interval=interval))
+    for _ in range(8):
+        board.ask(Segments(0, 0, 0, (segment,) * 4))
+    uno, seq = emulated_firmware.uno, board.seq
+    queued = uno.snapshot()
+
+    def check_fault_after(later_ticks: int) -> int:
+        """Steps that were made when a fault came in a motion that began so much later."""
+        uno.restore(queued)
+        board.forget_replies()
+        board.seq = seq
+        board.send(Start(LEAD_TICKS + later_ticks))
+        board.run(LEAD_TICKS + 40_000)
+        board.send(Segments(0, 0, 0, (segment_of(0),)))
+        board.run(20_000)
+        status = board.ask()
+        made = status.ledger.position_usteps[0]
+        assert status.fault is Fault.BAD_SEGMENT
+        assert status.ledger.executed_segments == (made - 1) // steps, f"{made} steps, {later_ticks} ticks later"
+        return made
+
+    end_ticks = check_fault_after(0) % steps * interval
+    coarse_ticks = 20
+    begins = range(end_ticks - 3_000, end_ticks + 3_000, coarse_ticks)
+    parts = [check_fault_after(later_ticks) % steps for later_ticks in begins]
+    ends = [at for at, pair in zip(begins, itertools.pairwise(parts), strict=False) if pair in {(0, 1), (1, 0)}]
+    assert ends
+    for at in ends:
+        for later_ticks in range(at, at + coarse_ticks):
+            check_fault_after(later_ticks)
+
+
+@pytest.mark.parametrize("quick", [0, 1])
+def test_a_stop_counts_a_segment_whose_end_is_just_past(emulated_firmware: EmulatedFirmware, quick: int) -> None:
+    # Slower than the start-stop speed a stop ends the motion at once, wherever it is: here around a segment's end.
+    duration = 170_000
+    board = Board(emulated_firmware)
+    board.get_ready()
+    segment = segment_of(duration, run_of(1, first=0))
+    board.ask(Segments(0, 0, 0, (segment,) * 6))
+    uno, seq = emulated_firmware.uno, board.seq
+    queued = uno.snapshot()
+    seen = set()
+    for later_ticks in range(0, 6_000, 20):
+        uno.restore(queued)
+        board.forget_replies()
+        board.seq = seq
+        board.send(Start(LEAD_TICKS + later_ticks))
+        board.run(LEAD_TICKS + 2 * duration)
+        board.send(Stop(quick))
+        board.run(20_000)
+        status = board.ask()
+        made = status.ledger.position_usteps[0]
+        assert status.state is State.READY
+        assert status.ledger.executed_segments == made - 1, f"{made} steps, {later_ticks} ticks later"
+        seen.add(made)
+    assert seen == {2, 3}

@@ -157,6 +157,12 @@ inline void steps_off() {
     }
 }
 
+inline uint16_t end_steps() {
+    const uint16_t last = board::counter();
+    steps_off();
+    return last;
+}
+
 inline void wait_step_high() { board::elapse(57); }
 
 template <uint8_t JOINT>

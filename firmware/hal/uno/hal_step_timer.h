@@ -229,11 +229,31 @@ HAL_INLINE bool step_interrupt_is_on() {
     return (on & step_interrupt_mask<JOINT>()) != 0;
 }
 
+HAL_INLINE void step_interrupts_off() {
+    TIMSK1 = ONLY_LAPS;
+    if (planarm::wire::JOINTS > 2) scheduled_on = TIMSK2 = 0;
+}
+
+// From the reading of the timer in end_steps to the last match that its writing of TCCR1A lets act.
+constexpr uint16_t END_TICKS = 4;
+
 // Disarms all channels and stops their interrupts; a pin that is high stays high.
 HAL_INLINE void steps_off() {
     TCCR1A = ALL_DISARMED;
-    TIMSK1 = ONLY_LAPS;
-    if (planarm::wire::JOINTS > 2) scheduled_on = TIMSK2 = 0;
+    step_interrupts_off();
+}
+
+// The same; returns the last tick whose match still raised its pin. Interrupts must be off.
+HAL_INLINE uint16_t end_steps() {
+    uint16_t counter;
+    __asm__ __volatile__(
+        "lds %A0, %1\n\t"
+        "lds %B0, %1 + 1\n\t"
+        "sts %2, %3"
+        : "=&r"(counter)
+        : "i"(&TCNT1L), "i"(&TCCR1A), "r"(ALL_DISARMED));
+    step_interrupts_off();
+    return static_cast<uint16_t>(counter + END_TICKS);
 }
 
 // Passes the least high time of a pulse that may have risen just now: 19 turns of 3 cycles.
