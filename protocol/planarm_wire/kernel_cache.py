@@ -14,6 +14,9 @@ A file that is edited while a process runs is compiled for that process alone an
 been imported before the edit. A kernel may call and freeze what its module imports at the left margin; one that is
 handed another as an argument would escape the hash, and the house has none.
 
+A kernel lets go of Python's interpreter while it runs, so that a thread which streams is not held up by one that
+plans. What a kernel writes to is its thread's own: arrays that its caller made, or `planarm.search.scratch`.
+
 Folder: `PLANARM_CACHE_DIR` when set, else the user's cache folder (`XDG_CACHE_HOME` or `~/.cache`, on
 macOS `~/Library/Caches`, on Windows `%LOCALAPPDATA%`), else, when that cannot be written, a folder of the
 user's own below the system's temporary folder. The latest 16 builds of a module are kept.
@@ -80,14 +83,14 @@ def _with_cache(function: F) -> F:
     inside = "" if source.stem != "__init__" else ".__init__"  # a package's own file, see _module_name
     module = function.__module__ + inside
     if _edited_since_start(module, source):
-        return cast("F", numba.njit(function))
+        return cast("F", numba.njit(nogil=True)(function))
     folder = _prepared_folder(module, source)
     with _config_lock:
         before = config.CACHE_DIR
         config.CACHE_DIR = str(folder)  # read by njit when it makes the function's cache, that is here
         try:
             # A wrapper for calls from C, which nothing here makes, would take a tenth of the time to compile.
-            compiled = numba.njit(cache=True, no_cfunc_wrapper=True)(function)
+            compiled = numba.njit(cache=True, no_cfunc_wrapper=True, nogil=True)(function)
         finally:
             config.CACHE_DIR = before
     return cast("F", compiled)

@@ -244,3 +244,28 @@ def test_only_the_latest_builds_are_kept(tmp_path: Path, monkeypatch: pytest.Mon
 def test_a_package_that_is_not_there_is_named() -> None:
     with pytest.raises(ModuleNotFoundError, match="no_such_package"):
         kernel_cache.is_cold("no_such_package")
+
+
+def test_a_kernel_lets_other_threads_run_meanwhile(package: Path, tmp_path: Path) -> None:
+    """It waits for what another thread writes; one that holds the interpreter would count to the end."""
+    look = """
+import threading
+import numpy as np
+from arm_kernels.waits import wait
+MOST = 1_000_000_000
+told = np.zeros(3, np.int64)
+wait(told, 2, 1)
+def tell():
+    while not told[1]:
+        pass
+    told[0] = 1
+thread = threading.Thread(target=tell)
+thread.start()
+print(wait(told, 2, MOST) < MOST)
+"""
+    kernel = "@kernel\ndef wait(told, others, most):\n    k = 0\n    while not told[0] and k < most:\n"
+    body = "        k += 1\n        told[1 + k % others] = k\n    return k\n"
+    for name in ("kernel", "bare_kernel"):
+        head = f"from planarm_wire.kernel_cache import {name} as kernel\n\n\n"
+        (package / "waits.py").write_text(head + kernel + body)
+        assert run(package, tmp_path / "cache", program=look) == ["True"], name
