@@ -31,7 +31,7 @@ from planarm.link.clock import Clock
 from planarm.link.exchange import StreamResult
 from planarm.link.positions import Positions, default_path
 from planarm.link.stream import Stream, StreamProgress
-from planarm.link.transport import PinTrace, Transport, open_transport
+from planarm.link.transport import PinTrace, Transport, open_transport, require_board
 from planarm.model.arm import Arm
 from planarm.model.kinematics import forward
 from planarm.plan import Findings, Plan
@@ -290,6 +290,7 @@ def run_scene(
         PlanarmError: the branch of the tree tells which stage failed. Differing steps are reported first, then raised.
             When the stream failed, its notes tell what the emulated arm did, and the folder is complete all the same.
     """
+    require_board(port, scene.board)
     plan = plan_scene(scene, notice)
     begin_run_folder(out, stored(plan))
     setup = ArmSetup(scene, plan.segments.start_usteps, faults, fault_seed)

@@ -12,7 +12,7 @@ from planarm.analysis.capture import PS_PER_TICK, open_capture
 from planarm.analysis.channels import Pins, map_channels
 from planarm.analysis.step_match import Schedule
 from planarm.analysis.timing import PulseLimits, TimingReport, TimingRules, analyse, recorded_schedules
-from planarm.errors import CaptureError
+from planarm.errors import CaptureError, UsageError
 from planarm.model.arm import Arm
 from planarm.model.kinematics import forward
 from planarm.model.transmission import Transmission
@@ -66,6 +66,7 @@ def judge_recording(request: TimingRequest, notice: Notice) -> TimingFindings:
     Raises:
         CaptureError: the recording cannot be read or lacks a line, or no such driver is known.
         PlanFileError, CertificateError: the plan cannot be read.
+        UsageError: the board that is named is not the plan's.
     """
     plan = load_plan(request.plan) if request.plan else None
     capture = open_capture(request.capture)
@@ -121,6 +122,11 @@ def tips_at(plan: StoredPlan, train: StepTrain, times_s: Sequence[float | None])
 def _pins(request: TimingRequest, plan: StoredPlan | None) -> Pins:
     """Return STEP and DIR pins of each joint: of the board that is named, or of the plan's joints."""
     if request.board is not None:
+        if plan is not None and plan.segments.board.name != request.board:
+            raise UsageError(
+                f"--board {request.board}: {request.plan} is for the board {plan.segments.board.name}; leave --board"
+                " out, or name the lines of another wiring with --map"
+            )
         return BOARDS[request.board].joint_pins
     if plan is None:
         return BOARDS["uno"].joint_pins

@@ -79,6 +79,19 @@ def test_jog_refuses_another_board_than_the_scenes(capsys):
     assert "needs the board uno_four" in capsys.readouterr().err
 
 
+@pytest.mark.parametrize("words", [["run"], ["replan", "--arrivals", "none.toml"]])
+@pytest.mark.parametrize("port", ["sim://?board=uno", "spy+sim://?usb=16u2&board=uno#x.journal"])
+def test_a_motion_for_another_board_is_refused_before_it_is_planned(words, port, tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    for planner in ("planarm.pipeline.find_route", "planarm.operations.replanning.first_plan"):
+        monkeypatch.setattr(planner, lambda *_: pytest.fail("it was planned"))
+    with pytest.raises(SystemExit) as left:
+        main([words[0], str(EXAMPLES / "three_links.toml"), *words[1:], "--port", port])
+    assert left.value.code == LinkError.exit_code
+    assert "needs the board uno_four; leave board=uno out" in " ".join(capsys.readouterr().err.split())
+    assert not list(tmp_path.iterdir())
+
+
 def test_a_missing_or_damaged_image_is_named(tmp_path):
     with pytest.raises(LinkError, match=r"sim://: .*nothing\.hex"):
         open_transport(f"sim://?image={tmp_path / 'nothing.hex'}")

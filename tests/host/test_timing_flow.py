@@ -89,6 +89,18 @@ def test_another_drivers_rules_can_be_asked_for(planned, tmp_path, capsys):
     assert json.loads(out)["counts"] == {"step_high": sum(map(len, train.joints))}
 
 
+def test_a_board_that_is_not_the_plans_is_refused(planned, tmp_path, capsys):
+    """Its pins would be another board's: steps would be looked for on lines that do not carry them."""
+    _, plan_file, train = planned
+    write_vcd(tmp_path / "a.vcd", train.moved(10**11))
+    code, _, err = leave(capsys, tmp_path / "a.vcd", "--plan", plan_file, "--board", "cnc_shield")
+    assert code == 2
+    assert "--board cnc_shield" in err
+    assert "short.plan is for the board uno; leave --board out" in " ".join(err.split())
+    code, _, _ = leave(capsys, tmp_path / "a.vcd", "--plan", plan_file, "--board", "uno")
+    assert code == 0
+
+
 def test_two_recordings_are_compared_across_formats_and_clocks(planned, tmp_path, capsys):
     _, _, train = planned
     write_vcd(tmp_path / "a.vcd", train)

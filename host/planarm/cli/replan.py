@@ -25,19 +25,20 @@ def execute(options: argparse.Namespace) -> int:
     from contextlib import closing
 
     from planarm.link.arm_record import ArmSetup
-    from planarm.link.transport import open_transport
+    from planarm.link.transport import open_transport, require_board
     from planarm.operations.arrivals import Listed, Watched
     from planarm.operations.replanning import first_plan, run_live
     from planarm.scene.arrivals import load_arrivals
     from planarm.warm_up import warm_up
 
+    port = scene.link.port if options.port is None else options.port
+    require_board(port, scene.board)
     source = Watched(Path(options.watch)) if options.watch else Listed(load_arrivals(Path(options.arrivals)))
     with progress(options.json) as notice:
         notice("kernels", 0.0)
         warm_up(on_roadmap=True, replanning=True)
         notice("kernels", 1.0)
         first = first_plan(scene, notice)
-        port = scene.link.port if options.port is None else options.port
         setup = ArmSetup(scene, first[1].segments.start_usteps)
         with closing(open_transport(port, scene.link.baud, setup)) as transport:
             result = run_live(scene, transport, source, notice, perf_counter, first, warn=notice.warn)

@@ -22,6 +22,10 @@ def execute(options: argparse.Namespace) -> int:
     require_folder_place(out)
     if options.faults:
         require_file(options.faults, EmulatorError, "give the path of a schedule of faults (docs/faults.md)")
+    from planarm.link.transport import require_board
+
+    port = scene.link.port if options.port is None else options.port
+    require_board(port, scene.board)
     compile_first("planarm", "planarm_sim")
     from planarm.pipeline import run_scene
     from planarm.warm_up import warm_up
@@ -30,7 +34,6 @@ def execute(options: argparse.Namespace) -> int:
         notice("kernels", 0.0)
         warm_up(on_roadmap=scene.planner.on_roadmap, moving=scene.moving is not None)
         notice("kernels", 1.0)
-        port = scene.link.port if options.port is None else options.port
         faults = Path(options.faults) if options.faults else None
         try:
             with live_view(options.live) as onlooker:

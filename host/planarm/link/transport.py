@@ -15,6 +15,7 @@
 ==============================  =====================================================================
 """
 
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, Protocol
 from urllib.parse import parse_qs, urlsplit
@@ -133,16 +134,36 @@ def _open_spied(url: str, baud: int, setup: ArmSetup | None, board: Board | None
     return RecordingTransport(line, journal)
 
 
-def _open_emulator(url: str, baud: int, setup: ArmSetup | None, board: Board | None) -> Transport:
-    from planarm.link.released_image import released_image  # noqa: PLC0415
-    from planarm.link.sim_transport import SimTransport  # noqa: PLC0415 - the emulator only where it is used
+@dataclass(frozen=True, slots=True)
+class _Emulated:
+    """What a sim:// URL asks for."""
 
+    board: Board
+    image: str | None
+    usb: Literal["direct", "16u2"]
+    isr: bool
+
+
+def require_board(url: str, board: Board) -> None:
+    """Check that a URL does not name another board than a scene's, before anything is made for it.
+
+    A real board tells what it is when it is opened, and so does a flash image of one's own.
+
+    Raises:
+        LinkError: it does, or is no URL of the emulator.
+    """
+    inner = url.removeprefix(SPY_PREFIX).partition("#")[0] if url.startswith(SPY_PREFIX) else url
+    if inner.lower().startswith(f"{SIM_SCHEME}://"):
+        _emulated(inner, board)
+
+
+def _emulated(url: str, wanted: Board | None) -> _Emulated:
+    """Read a sim:// URL for a scene's board, where there is one."""
     parts = urlsplit(url)
     options = parse_qs(parts.query, keep_blank_values=True)
     kinds: dict[str, Literal["direct", "16u2"]] = {"direct": "direct", "16u2": "16u2"}
     usb = kinds.get(options.get("usb", ["direct"])[-1])
     isr = {"0": False, "1": True}.get(options.get("isr", ["0"])[-1])
-    wanted = board or (setup.scene.board if setup else None)
     named = options.get("board", [(wanted or emulated_board(None)).name])[-1]
     known = {"image", "board", "usb", "isr"}
     if parts.netloc or parts.path or set(options) - known or usb is None or isr is None or named not in BOARDS:
@@ -155,8 +176,15 @@ def _open_emulator(url: str, baud: int, setup: ArmSetup | None, board: Board | N
             f"port {url!r}: the scene's arm needs the board {wanted.name}; leave board={named} out, or change"
             " board.wiring in the scene"
         )
-    images = options.get("image")
-    line = SimTransport(images[-1] if images else released_image(named), baud, setup, usb, BOARDS[named])
-    if isr:
+    return _Emulated(BOARDS[named], options["image"][-1] if "image" in options else None, usb, isr)
+
+
+def _open_emulator(url: str, baud: int, setup: ArmSetup | None, board: Board | None) -> Transport:
+    from planarm.link.released_image import released_image  # noqa: PLC0415
+    from planarm.link.sim_transport import SimTransport  # noqa: PLC0415 - the emulator only where it is used
+
+    asked = _emulated(url, board or (setup.scene.board if setup else None))
+    line = SimTransport(asked.image or released_image(asked.board.name), baud, setup, asked.usb, asked.board)
+    if asked.isr:
         line.uno.observe()
     return line
