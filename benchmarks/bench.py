@@ -19,6 +19,7 @@ from planarm.link.exchange import stream_plan
 from planarm.link.released_image import released_image
 from planarm.link.sim_bench import build_bench
 from planarm.link.sim_transport import SimTransport
+from planarm.notice import silent
 from planarm.pipeline import plan_scene
 from planarm.scene import load_scene
 from planarm_sim import Uno
@@ -30,7 +31,7 @@ RUNS = 5
 
 def main() -> None:
     """Measure and print."""
-    plan = plan_scene(load_scene(CASE1), lambda _stage, _share: None)
+    plan = plan_scene(load_scene(CASE1), silent)
     setup = ArmSetup(plan.scene, plan.segments.start_usteps)
     rows = []
     for what, arm in (("Uno", None), ("Uno + drivers + motors + arm", setup)):

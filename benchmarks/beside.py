@@ -25,10 +25,11 @@ from rich.table import Table
 from planarm.model.arm import Arm
 from planarm.model.kinematics import forward
 from planarm.model.shapes import shape_of
+from planarm.motions.margin import planning_margin_cm
+from planarm.notice import silent
 from planarm.operations.beside import InThread
 from planarm.operations.replanning import first_plan
 from planarm.operations.splicing import borders_from, first_border, plan_from_borders
-from planarm.pipeline import planning_margin_cm
 from planarm.scene import Obstacle, load_scene
 
 EXAMPLES = Path(__file__).resolve().parents[1] / "examples"
@@ -67,7 +68,7 @@ def prepared(name: str) -> Callable[[], object]:
     """Return the work: an example without its obstacles, a roadmap, a plan, and a circle that appears on its way."""
     scene = replace(load_scene(EXAMPLES / f"{name}.toml"), obstacles=())
     margin_cm = planning_margin_cm(scene)
-    task, before = first_plan(scene, lambda _stage, _share: None)
+    task, before = first_plan(scene, silent)
     end_s = before.trajectory.duration_s
     x_cm, y_cm = forward(Arm.from_spec(scene.arm), before.trajectory.sample(np.array([0.7 * end_s]))[0])[0, -1]
     obstacle = Obstacle("circle", (float(x_cm), float(y_cm)), 2.0)

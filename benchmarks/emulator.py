@@ -28,6 +28,7 @@ from planarm.experiments.scenes import table1_scene
 from planarm.link.exchange import stream_plan
 from planarm.link.released_image import released_image
 from planarm.link.sim_transport import SimTransport
+from planarm.notice import silent
 from planarm.pipeline import plan_scene
 from planarm_sim import Uno
 
@@ -84,7 +85,7 @@ def at_rest() -> Cells:
 
 def streaming() -> list[Cells]:
     """Stream the plan of case 1 once with the host, then play its bytes again without it."""
-    plan = plan_scene(table1_scene(1), lambda _stage, _share: None)
+    plan = plan_scene(table1_scene(1), silent)
     segments = plan.segments.segments
     line = RecordedLine(released_image())
     stream_plan(line, segments)  # not counted

@@ -25,6 +25,7 @@ from rich.console import Console
 from rich.table import Table
 
 from planarm.experiments.scenes import example_file, table1_scene
+from planarm.notice import silent
 from planarm.pipeline import plan_scene
 from planarm.scene import JointSpec, load_scene
 from planarm.stepping.segments import Coding, compress
@@ -101,7 +102,7 @@ def trains() -> list[tuple[str, StepTrain, tuple[JointSpec, ...]]]:
     scenes = (("plan, 50 k on both", load_scene(example_file("fast_arm.toml"))), ("Table I, case 1", table1_scene(1)))
     planned = []
     for name, scene in scenes:
-        plan = plan_scene(scene, lambda _stage, _share: None)
+        plan = plan_scene(scene, silent)
         planned.append((name, plan.train, plan.scene.joints))
     return [*planned, ("hard, 20 k steps/s", *reference_train())] + [
         (f"smooth, {rate_hz // 1000} k steps/s", *smooth(rate_hz)) for rate_hz in (20_000, 45_000)

@@ -22,7 +22,7 @@ from rich.table import Table
 from planarm.experiments.scenes import table1_scene
 from planarm.fastest.search import Budget, find_fastest
 from planarm.fastest.task import scene_task
-from planarm.pipeline import planning_margin_cm
+from planarm.motions.margin import planning_margin_cm
 from planarm.routes.route import smoothed, tip_route
 from planarm.scene import Scene
 from planarm.smoothing.smooth_path import Floats, SmoothPath

@@ -16,6 +16,7 @@ from planarm.experiments.table2 import load_case
 from planarm.model.arm import Arm
 from planarm.model.kinematics import forward
 from planarm.model.shapes import shape_of
+from planarm.notice import silent
 from planarm.pipeline import plan_scene
 from planarm.report import draw_workspace
 from planarm.report.envelope import draw_envelope
@@ -56,7 +57,7 @@ def _draw_envelope(scene_file: Path, target: Path) -> None:
 
 def _draw_plan(scene_file: Path, target: Path) -> None:
     """Draw the plan that `planarm run` makes of a scene: the path with its corners blended, and the arm along it."""
-    plan = plan_scene(load_scene(scene_file), lambda _stage, _share: None)
+    plan = plan_scene(load_scene(scene_file), silent)
     q_rad = plan.trajectory.sample(np.linspace(0.0, plan.trajectory.duration_s, CURVE_POINTS))[0]
     planner = plan.scene.planner
     draw_path(
@@ -146,7 +147,7 @@ def _draw_cases(free_space: Path, joints: Path, hopping: Path) -> None:
 
 def _draw_joint_plan(scene_file: Path, target: Path) -> None:
     """Draw a plan made in joint space, with its way-points and the arm on its way."""
-    plan = plan_scene(load_scene(scene_file), lambda _stage, _share: None)
+    plan = plan_scene(load_scene(scene_file), silent)
     arm, joint = Arm.from_spec(plan.scene.arm), plan.joint
     q_rad = plan.trajectory.sample(np.linspace(0.0, plan.trajectory.duration_s, CURVE_POINTS))[0]
     shown = np.linspace(0, CURVE_POINTS - 1, POSES_SHOWN).round().astype(int)

@@ -11,6 +11,7 @@ from pathlib import Path
 from playwright.sync_api import sync_playwright
 
 from planarm.errors import PlanarmError
+from planarm.notice import silent
 from planarm.pipeline import run_scene
 from planarm.scene import load_scene
 
@@ -44,7 +45,7 @@ def make_screenshots(folder: Path) -> list[Path]:
 def _report(out: Path, scene: Path, faults: Path | None) -> Path:
     """Run a scene and return its report; a run that goes wrong as wanted has one, too."""
     try:
-        run_scene(load_scene(scene), "sim://", out, lambda _stage, _share: None, faults=faults)
+        run_scene(load_scene(scene), "sim://", out, silent, faults=faults)
     except PlanarmError:
         if faults is None:  # else it was asked to go wrong, and the report says how
             raise

@@ -9,7 +9,8 @@ from planarm.analysis.step_count import MeasuredSteps
 from planarm.errors import DeviceFault, LinkError
 from planarm.link.released_image import released_image
 from planarm.link.sim_transport import SimTransport
-from planarm.pipeline import judge_pins, stored
+from planarm.pipeline import stored
+from planarm.record.look import judge_pins
 from planarm.run_folder.folder import begin_run_folder
 from planarm.stepping.expand import expand
 from planarm.streaming.plan_stream import options_for, record, stream

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -16,6 +16,7 @@ from planarm.errors import CaptureError, UsageError
 from planarm.model.arm import Arm
 from planarm.model.kinematics import forward
 from planarm.model.transmission import Transmission
+from planarm.notice import Notice
 from planarm.plan_file import StoredPlan, load_plan
 from planarm.scene.rebuild import scene_from_mapping
 from planarm.stepping.expand import expand
@@ -23,7 +24,6 @@ from planarm.stepping.train import StepTrain
 from planarm_wire.drivers import DRIVERS, DriverRow
 from planarm_wire.messages import BOARDS, TICKS_HZ
 
-Notice = Callable[[str, float], None]
 Point = tuple[float, float]
 
 RESONANT_FULL_STEPS_HZ = (80.0, 200.0)

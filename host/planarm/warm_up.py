@@ -17,10 +17,12 @@ from planarm.model.arm import Arm
 from planarm.model.kinematics import forward
 from planarm.model.moving import later
 from planarm.model.shapes import Circle, Polygon
+from planarm.motions.margin import planning_margin_cm
+from planarm.notice import silent
 from planarm.operations.replanning import first_plan, plan_from
 from planarm.operations.splicing import first_border, plan_from_border
 from planarm.operations.verdicts import judge
-from planarm.pipeline import plan_scene, planning_margin_cm
+from planarm.pipeline import plan_scene
 from planarm.routes.moving_route import find_moving_route, rest_touch
 from planarm.routes.route import find_route
 from planarm.scene import parse_scene
@@ -108,7 +110,7 @@ def warm_up(*, on_roadmap: bool = False, moving: bool = False, replanning: bool 
     if replanning:
         warm_up_replanning()
     for planner in (*PLANNERS, *((ON_ROADMAP,) if on_roadmap else ())):
-        plan_scene(parse_scene(SMALL_SCENE + planner, "warm-up"), lambda _stage, _share: None)
+        plan_scene(parse_scene(SMALL_SCENE + planner, "warm-up"), silent)
 
 
 def warm_up_search() -> None:
@@ -141,13 +143,13 @@ def warm_up_emulator() -> None:
 def warm_up_replanning() -> None:
     """Plan on a roadmap, let obstacles appear beside the way, and plan again from where an arm was stopped."""
     scene = parse_scene(SMALL_SCENE + ON_ROADMAP, "warm-up")
-    task, plan = first_plan(scene, lambda _stage, _share: None)
+    task, plan = first_plan(scene, silent)
     (rest_rad,) = plan.trajectory.sample(np.array([0.2 * plan.trajectory.duration_s]))[0]
     for shape in (Circle((-4.0, 1.0), 0.1), Polygon(((-4.5, 1.0), (-4.0, 1.0), (-4.0, 1.5)))):
         judge(plan, shape, planning_margin_cm(scene), 0.0, 0.0)
         _, changes = task.roadmap.add_obstacle(shape)
         task.planner.change(changes)
-    plan_from(scene, task, rest_rad, lambda _stage, _share: None)
+    plan_from(scene, task, rest_rad, silent)
     border, margin_cm = first_border(plan, 0, 0.0), planning_margin_cm(scene)
     assert border is not None, "a motion has more than one segment"
     plan_from_border(scene, task, plan, border, 0.0, margin_cm)
@@ -162,7 +164,7 @@ def warm_up_moving() -> None:
     """Plan among moving obstacles, with all that is told about it, and once more from where an arm was stopped."""
     arm_and_rest, task = SMALL_SCENE.split("[task]")
     scene = parse_scene(f"{arm_and_rest}{AMONG_MOVING}[task]{task}", "warm-up")
-    plan = plan_scene(scene, lambda _stage, _share: None)
+    plan = plan_scene(scene, silent)
     stopped_s = 0.4 * plan.trajectory.duration_s
     (rest_rad,) = plan.trajectory.sample(np.array([stopped_s]))[0]
     x, y = forward(Arm.from_spec(scene.arm), rest_rad)[-1]

@@ -16,6 +16,8 @@ ALLOWED: dict[str, set[str]] = {
     "planarm_wire.kernel_cache": set(),
     "planarm": set(),
     "planarm.errors": set(),
+    # docs/decisions/0121: what tells how far a long piece of work is
+    "planarm.notice": set(),
     "planarm.output": {"planarm.errors"},
     # docs/decisions/0081: codes of everything that can go wrong
     "planarm.explain": {"planarm_wire", "planarm.errors"},
@@ -86,6 +88,8 @@ ALLOWED: dict[str, set[str]] = {
     },
     # docs/decisions/0080: a run as plain values, between the stages and the page
     "planarm.record": {
+        "planarm.analysis",
+        "planarm.streaming",
         "planarm_wire",
         "planarm",
         "planarm.explain",
@@ -97,10 +101,11 @@ ALLOWED: dict[str, set[str]] = {
         "planarm.link",
         "planarm.plan",
     },
-    "planarm.analysis": {"planarm.errors", *WIRE},
+    "planarm.analysis": {"planarm.notice", "planarm.errors", *WIRE},
     "planarm.report": {"planarm_wire", "planarm", "planarm.errors", "planarm.analysis"},
     # docs/decisions/0071: a motion among moving obstacles has its times from the search
     "planarm.routes": {
+        "planarm.notice",
         "planarm.errors",
         "planarm.scene",
         "planarm.model",
@@ -122,6 +127,8 @@ ALLOWED: dict[str, set[str]] = {
     },
     # docs/decisions/0078: the one loop; it re-enters at search with what has changed
     "planarm.operations": {
+        "planarm.motions",
+        "planarm.notice",
         "planarm.errors",
         "planarm.scene",
         "planarm.model",
@@ -143,6 +150,7 @@ ALLOWED: dict[str, set[str]] = {
     # docs/decisions/0065: how plans are streamed and gone on with
     # docs/decisions/0066: small moves of a real arm
     "planarm.streaming": {
+        "planarm.notice",
         "planarm_wire",
         "planarm",
         "planarm.errors",
@@ -155,22 +163,32 @@ ALLOWED: dict[str, set[str]] = {
         "planarm.plan",
         "planarm.plan_file",
     },
-    "planarm.pipeline": {
+    # docs/decisions/0121: what the pipeline's one line "motion" is made of
+    "planarm.motions": {
         "planarm_wire",
-        "planarm",
         "planarm.errors",
+        "planarm.notice",
+        "planarm.scene",
+        "planarm.model",
+        "planarm.search",
+        "planarm.trajectory",
+        "planarm.fastest",
+        "planarm.stepping",
+        "planarm.routes",
+    },
+    "planarm.pipeline": {
+        "planarm.errors",
+        "planarm.notice",
         "planarm.scene",
         "planarm.model",
         "planarm.workspace",
         "planarm.search",
-        "planarm.smoothing",
         "planarm.trajectory",
-        "planarm.fastest",
         "planarm.stepping",
         "planarm.link",
         "planarm.record",
-        "planarm.analysis",
         "planarm.routes",
+        "planarm.motions",
         "planarm.plan",
         "planarm.streaming",
         "planarm.run_folder",
@@ -200,6 +218,8 @@ ALLOWED: dict[str, set[str]] = {
         "planarm.stepping",
     },
     "planarm.warm_up": {
+        "planarm.motions",
+        "planarm.notice",
         "planarm.scene",
         "planarm.model",
         "planarm.smoothing",
@@ -220,6 +240,7 @@ ALLOWED: dict[str, set[str]] = {
         "planarm.stepping",
     },
     "planarm.campaign": {
+        "planarm.notice",
         "planarm_wire",
         "planarm",
         "planarm.errors",
@@ -239,6 +260,7 @@ ALLOWED: dict[str, set[str]] = {
         "planarm_sim",
     },
     "planarm.timing_flow": {
+        "planarm.notice",
         "planarm_wire",
         "planarm.errors",
         "planarm.scene",
@@ -249,6 +271,7 @@ ALLOWED: dict[str, set[str]] = {
     },
     "planarm.envelope": {"planarm.errors", "planarm.scene", "planarm.model", "planarm.stepping"},
     "planarm.experiments": {
+        "planarm.notice",
         "planarm_wire.kernel_cache",
         "planarm.errors",
         "planarm.scene",
@@ -262,6 +285,8 @@ ALLOWED: dict[str, set[str]] = {
         "planarm.report",
     },
     "planarm.cli": {
+        "planarm.motions",
+        "planarm.notice",
         "planarm",
         "planarm.errors",
         "planarm.output",

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from planarm.errors import SceneError, TimingError
-from planarm.pipeline import planning_margin_cm
+from planarm.motions.margin import planning_margin_cm
 from planarm.routes.gentle import ROOM_CM, gentle_motion, jerk_limits
 from planarm.routes.route import find_route
 from planarm.scene import load_scene, parse_scene

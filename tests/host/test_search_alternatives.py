@@ -12,7 +12,8 @@ from host_scenes import make_scene, oracle_clearance_cm
 from planarm.cli.main import main
 from planarm.errors import NoPathError
 from planarm.model.arm import Arm
-from planarm.pipeline import plan_scene, planning_margin_cm
+from planarm.motions.margin import planning_margin_cm
+from planarm.pipeline import plan_scene
 from planarm.routes.alternatives import alternatives
 from planarm.scene import JointSpaceSpec, Obstacle
 from planarm.search.alternatives import crossed_gates, gates_of, ways

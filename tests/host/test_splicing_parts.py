@@ -13,9 +13,9 @@ from planarm.link.packing import Packer
 from planarm.link.session import Session
 from planarm.link.stream import Stream
 from planarm.model.transmission import motor_axes
+from planarm.motions.margin import planning_margin_cm
 from planarm.operations.replanning import first_plan
 from planarm.operations.splicing import Border, first_border, plan_from_border, why_not
-from planarm.pipeline import planning_margin_cm
 from planarm.smoothing.joint_spline import part_of, run_on
 from planarm.stepping.certify import certify
 from planarm.stepping.schedule import with_first_steps

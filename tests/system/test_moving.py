@@ -12,8 +12,9 @@ from planarm.link.arm_record import ArmSetup
 from planarm.link.transport import open_transport
 from planarm.model.arm import Arm
 from planarm.model.kinematics import forward
-from planarm.pipeline import judge_emulated_arm, judge_pins, plan_scene, run_scene
+from planarm.pipeline import plan_scene, run_scene
 from planarm.record.arm_findings import judge_arm
+from planarm.record.look import judge_emulated_arm, judge_pins
 from planarm.run_folder.summary import planned_figures
 from planarm.scene import ObstacleMotion
 from planarm.stepping.certify import certify

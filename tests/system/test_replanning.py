@@ -7,10 +7,10 @@ import pytest
 
 from live_runs import GOAL, SCENE, Outcome, circle, quiet, tip_at
 from planarm.model.shapes import shape_of
+from planarm.motions.margin import planning_margin_cm
 from planarm.operations.beside import AsLong
 from planarm.operations.replanning import first_plan
 from planarm.operations.verdicts import GENTLE_SHARE, judge, rest_time_s
-from planarm.pipeline import planning_margin_cm
 from planarm.scene import Obstacle
 from planarm.scene.arrivals import Arrival
 

@@ -10,7 +10,8 @@ import pytest
 from planarm.errors import DeviceFault, HostKilledError, LinkError
 from planarm.link.arm_record import ArmSetup
 from planarm.link.transport import open_transport
-from planarm.pipeline import judge_emulated_arm, judge_pins, plan_scene
+from planarm.pipeline import plan_scene
+from planarm.record.look import judge_emulated_arm, judge_pins
 from planarm.scene import load_scene
 from planarm.streaming.plan_stream import stream
 from planarm_sim.faults import KINDS, load_schedule

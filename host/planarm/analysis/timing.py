@@ -6,7 +6,7 @@ a chunk, the plan's steps and the listed findings, whatever the recording's leng
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -32,9 +32,9 @@ from planarm.analysis.step_scan import (
     scan_chunk,
 )
 from planarm.errors import CaptureError
+from planarm.notice import Notice, silent
 
 Ints = npt.NDArray[np.int64]
-Notice = Callable[[str, float], None]
 
 MOST_FINDINGS = 1000
 CURVE_BINS = 400
@@ -186,7 +186,7 @@ def analyse(
     channels: ChannelMap,
     schedules: Sequence[Schedule] | None,
     rules: TimingRules,
-    notice: Notice = lambda _stage, _share: None,
+    notice: Notice = silent,
 ) -> TimingReport:
     """Judge a recording.
 

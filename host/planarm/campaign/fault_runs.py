@@ -29,6 +29,7 @@ from planarm.link.position import Certainty, PositionReport
 from planarm.link.released_image import released_image
 from planarm.link.stream import Stream
 from planarm.model.transmission import motor_axes
+from planarm.notice import silent
 from planarm.operations.resume import go_on, load_run
 from planarm.pipeline import plan_scene, stored
 from planarm.plan_file import save_plan
@@ -253,7 +254,7 @@ def _waveform(board: Uno, pin: str) -> Waveform:
 def _stage(scene: Scene) -> Stage:
     from planarm_sim import Uno  # noqa: PLC0415 - the emulator is loaded where it is used
 
-    plan = plan_scene(scene, lambda _stage, _share: None)
+    plan = plan_scene(scene, silent)
     board = Uno.from_hex(released_image(scene.board.name))
     board.run(seconds=BOOT_S)
     board.clear_edges()

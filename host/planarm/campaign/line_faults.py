@@ -21,6 +21,7 @@ from planarm.link.exchange import stream_plan
 from planarm.link.released_image import released_image
 from planarm.link.sim_transport import SimTransport
 from planarm.link.stream_values import StreamOptions
+from planarm.notice import silent
 from planarm.pipeline import plan_scene
 from planarm.scene import Scene
 from planarm.stepping.expand import expand
@@ -136,7 +137,7 @@ class _Recorder(SimTransport):
 @lru_cache(maxsize=4)
 def record(scene: Scene) -> Recording:
     """Stream the scene's plan to the emulated board once, and keep what the host wrote and when."""
-    plan = plan_scene(scene, lambda _stage, _share: None)
+    plan = plan_scene(scene, silent)
     line = _Recorder(scene.board)
     stream_plan(line, plan.segments.segments, options=StreamOptions(wiring=scene.wiring))
     return Recording(expand(plan.segments), tuple(line.written), line.before)

@@ -15,6 +15,7 @@ from planarm.campaign.fault_runs import run_faults
 from planarm.campaign.line_faults import run_line
 from planarm.campaign.task import Figures, SceneText, Value
 from planarm.errors import CertificateError, NoPathError, SceneError, TimingError
+from planarm.notice import silent
 from planarm.pipeline import plan_scene
 from planarm.scene import Scene
 from planarm.scene.load import scene_from_toml
@@ -81,7 +82,7 @@ def run_plan(scene: SceneText, settings: Mapping[str, Value], _options: Mapping[
     """Plan, time, quantise, compress and certify."""
     parsed = scene_of(scene, settings)
     try:
-        plan = plan_scene(parsed, lambda _stage, _share: None)
+        plan = plan_scene(parsed, silent)
     except NoPathError as error:
         return NO_PATH, str(error), {}
     except (TimingError, CertificateError) as error:

@@ -19,8 +19,8 @@ if TYPE_CHECKING:
     from rich.console import Console
     from rich.table import Table
 
-    from planarm.experiments.notice import Notice
     from planarm.experiments.text_table import TextTable
+    from planarm.notice import Notice
 
 Result = TypeVar("Result")
 

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 from planarm.cli.progress import progress
 from planarm.cli.scenes import chosen_scene, compile_first
 from planarm.cli.terminal import terminal
+from planarm.notice import silent
 from planarm.output import writing
 
 if TYPE_CHECKING:
@@ -66,7 +67,7 @@ def execute(options: argparse.Namespace) -> int:
 
                 def certify(changed: Scene) -> Certificate:
                     notice(stage, next(trial) / MOST_TRIALS)
-                    return plan_scene(changed, lambda _stage, _share: None).certificate
+                    return plan_scene(changed, silent).certificate
 
                 return certify
 

@@ -79,7 +79,7 @@ def execute(options: argparse.Namespace) -> int:
 
 def _alternatives(scene: Scene, options: argparse.Namespace) -> list[dict[str, object]]:
     """Find the routes, print them as a table unless JSON is wanted, and return their figures."""
-    from planarm.pipeline import planning_margin_cm
+    from planarm.motions.margin import planning_margin_cm
     from planarm.routes.alternatives import alternatives
 
     with progress(options.json) as notice:

@@ -7,13 +7,13 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from planarm.experiments.notice import Notice, silent
 from planarm.experiments.printed import ArcTangent, forward_paper_b, inverse_paper_c, search_paper_c
 from planarm.experiments.published import A_STAR, CASES, CHS, MODIFIED, TABLE2, Planner
 from planarm.experiments.table2 import Case, load_case
 from planarm.experiments.text_table import TextTable, number
 from planarm.model.arm import Arm
 from planarm.model.kinematics import forward, inverse_2r
+from planarm.notice import Notice, silent
 from planarm.search.stencils import stencil
 
 Floats = NDArray[np.float64]

@@ -25,9 +25,9 @@ from numpy.typing import NDArray
 from planarm.errors import SceneError
 from planarm.experiments.benchmark_scenes import benchmark_scene, problem, scene_hash
 from planarm.experiments.node_optimum import line_is_legal
-from planarm.experiments.notice import Notice, silent
 from planarm.experiments.scenes import example_file
 from planarm.experiments.text_table import TextTable, number
+from planarm.notice import Notice, silent
 from planarm.scene import Scene
 from planarm.workspace.free_map import FreeMap
 

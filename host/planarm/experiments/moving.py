@@ -15,9 +15,9 @@ from typing import Final, Literal
 import numpy as np
 
 from planarm.errors import SceneError
-from planarm.experiments.notice import Notice, silent
 from planarm.experiments.scenes import example_file
 from planarm.model.arm import Arm
+from planarm.notice import Notice, silent
 from planarm.scene import Scene, load_scene
 from planarm.search.moving.rules import Rule, RuleRun, first_contact, run_rule
 from planarm.search.moving.space_time import search_space_time

@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 from planarm.experiments.moving import Environment, Moving
 from planarm.experiments.moving_published import PUBLISHED
 from planarm.experiments.moving_tables import as_json, as_markdown
-from planarm.experiments.notice import Notice, silent
 from planarm.model.arm import Arm
 from planarm.model.kinematics import ElbowSide, forward
 from planarm.model.moving import offset_cm, shape_at
 from planarm.model.shapes import Circle, Polygon, shape_of
+from planarm.notice import Notice, silent
 from planarm.report.animation import MovingShape, write_animation
 from planarm.report.curves import draw_joint_angles
 from planarm.report.moving import Frame, draw_angle_changes, draw_costs, draw_frames, draw_free_spaces, draw_paths

@@ -7,7 +7,6 @@ free at time 0; whether a motion exists at all is the exact search's to say.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from statistics import fmean, median
 from typing import Final, Literal
@@ -20,6 +19,7 @@ from planarm.experiments.text_table import TextTable, number
 from planarm.model.arm import Arm
 from planarm.model.kinematics import ElbowSide, forward
 from planarm.model.moving import first_touches, moving_set
+from planarm.notice import Notice, silent
 from planarm.scene import Obstacle, ObstacleMotion, Scene, TaskSpec, load_scene
 from planarm.search.moving.rules import run_rule
 from planarm.search.moving.space_time import search_space_time
@@ -60,9 +60,7 @@ class RandomMoving:
     """Numbers of the scenes whose executed plan touched something: none is expected."""
 
 
-def compare_random(
-    count: int, seed: int = 1, notice: Callable[[str, float], None] = lambda _stage, _share: None
-) -> RandomMoving:
+def compare_random(count: int, seed: int = 1, notice: Notice = silent) -> RandomMoving:
     """Plan so many random scenes in all three ways.
 
     Args:

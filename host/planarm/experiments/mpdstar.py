@@ -22,11 +22,11 @@ from planarm.experiments.mpdstar_cases import (
 )
 from planarm.experiments.mpdstar_growth import PUBLISHED, SIZES, GrowthRow, Saving, growth, savings
 from planarm.experiments.mpdstar_scenes import ASSUMPTIONS, CASES
-from planarm.experiments.notice import Notice
 from planarm.experiments.text_table import TextTable, number
 from planarm.model.arm import Arm
 from planarm.model.kinematics import forward
 from planarm.model.shapes import shape_of
+from planarm.notice import Notice
 from planarm.report.roadmap import draw_energies, draw_growth, draw_savings, draw_way
 from planarm.search.incremental import GraphAlgorithm
 

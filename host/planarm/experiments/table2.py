@@ -16,11 +16,11 @@ from typing import Final, Literal
 
 import numpy as np
 
-from planarm.experiments.notice import Notice, silent
 from planarm.experiments.published import A_STAR, CASES, CHAOS, PLANNERS, TABLE2, Figures, Planner
 from planarm.experiments.scenes import table1_scene
 from planarm.model.arm import Arm
 from planarm.model.kinematics import inverse_2r
+from planarm.notice import Notice, silent
 from planarm.scene import Moves, PlannerSpec, Scene, Subset
 from planarm.search.grid_search import find_path
 from planarm.search.path import Path

@@ -5,11 +5,11 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
-from planarm.experiments.notice import Notice, silent
 from planarm.experiments.pictures import draw_angles, draw_free_space, draw_paper_stencils, draw_path
 from planarm.experiments.published import CASES, CHAOS, PLANNERS, Planner
 from planarm.experiments.table2 import Case, Table2, load_case, typical_path
 from planarm.experiments.table2_tables import as_json, as_markdown
+from planarm.notice import Notice, silent
 
 
 def write_table2(result: Table2, out: Path, notice: Notice = silent) -> list[Path]:

@@ -15,7 +15,10 @@ from planarm.link.transport import Transport
 from planarm.model.arm import Arm
 from planarm.model.kinematics import forward
 from planarm.model.transmission import Transmission
-from planarm.pipeline import plan_scene, planning_margin_cm, timed
+from planarm.motions.margin import planning_margin_cm
+from planarm.motions.motion import timed
+from planarm.notice import silent
+from planarm.pipeline import plan_scene
 from planarm.scene import Scene, TaskSpec
 from planarm.smoothing.joint_blend import blend_poses
 from planarm.stepping.certify import certify
@@ -48,7 +51,7 @@ def goto(
     if standing.how is None:
         raise LinkError("where the arm stands is not known: 'planarm home SCENE' or 'planarm zero SCENE' first")
     there = replace(scene, task=_task(scene, standing, target_cm, pose_rad))
-    plan = plan_scene(there, lambda _stage, _share: None)
+    plan = plan_scene(there, silent)
     if plan.segments.start_usteps != standing.usteps:
         raise SceneError(
             scene.source,

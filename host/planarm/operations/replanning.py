@@ -35,10 +35,12 @@ from planarm.model.arm import Arm
 from planarm.model.kinematics import forward
 from planarm.model.shapes import shape_of
 from planarm.model.transmission import Transmission
+from planarm.motions.margin import planning_margin_cm
+from planarm.notice import Notice
 from planarm.operations.beside import AsLong, Beside, InThread
 from planarm.operations.splicing import Border, borders_from, first_border, plan_from_borders, why_not
 from planarm.operations.verdicts import Verdict, contact_time_s, judge_contact, whereabouts_s
-from planarm.pipeline import Notice, plan_scene, planning_margin_cm
+from planarm.pipeline import plan_scene
 from planarm.plan import Plan
 from planarm.roadmap.planning import RoadmapTask, way_from
 from planarm.routes.route import route_through

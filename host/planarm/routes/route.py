@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from time import perf_counter
 
@@ -10,6 +9,7 @@ import numpy as np
 
 from planarm.errors import NoPathError, SceneError
 from planarm.model.arm import Arm
+from planarm.notice import Notice
 from planarm.roadmap.planning import OBJECTIVES, RoadmapTask, joint_route_of
 from planarm.scene import JointSpaceSpec, Scene
 from planarm.search.costed import JOINT_TRAVEL, Price, time_price
@@ -27,8 +27,6 @@ from planarm.workspace.free_map import FreeMap, RegionMap, build_free_map, tip_m
 from planarm.workspace.joint_proof import joint_world
 from planarm.workspace.world import FREE, elbow_sides
 
-Notice = Callable[[str, float], None]
-"""Told the stage and the share of it that is done."""
 OPTIMUM = "optimum"
 """The stage in which the any-angle optimum is looked for, where that takes long."""
 

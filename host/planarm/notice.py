@@ -1,4 +1,4 @@
-"""What a long comparison tells its progress to."""
+"""What tells how far a long piece of work is, from all rooms alike."""
 
 from collections.abc import Callable
 
