@@ -128,14 +128,11 @@ def sped_up(stretch: int, rate: int, path_ticks: int = SEGMENT_TICKS, target: in
     """The least stretch that three turns of Newton's method from above find for s1 + rate D s1^3 = s0, in 2^-16."""
     end = stretch
     for _ in range(3):
-        relative = min(rate * path_ticks, 2**32 - 1) * min(end * end >> 16, 2**32 - 1) >> 32
-        if relative >= 8 * ONE:
-            end -= end >> 2
-        else:
-            above = (end * relative >> 16) - (stretch - end)
-            if above <= 0:
-                break
-            end -= above // (((ONE + 3 * relative) >> 8) + 1) << 8
+        relative = min(min(rate * path_ticks, 2**32 - 1) * min(end * end >> 16, 2**32 - 1) >> 32, 8 * ONE)
+        above = (end * relative >> 16) - (stretch - end)
+        if above <= 0:
+            break
+        end -= above // (((ONE + 3 * relative) >> 8) + 1) << 8
     return max(end, target)
 
 

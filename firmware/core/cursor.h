@@ -35,26 +35,26 @@ class Cursor {
     void shift(uint32_t ticks) { increase(last_ticks_, ticks); }
 
   private:
-    // The next steps of a slice. Times are in 2^-16 ticks from the tick of the first of them: steps of one
-    // slice are less than 65,536 ticks apart.
+    // The next steps of a slice. Times are in 2^-16 ticks from the tick of the first of them, modulo 2^32:
+    // steps of one slice are less than 65,536 ticks apart.
     struct Steps {
         uint8_t count;
         uint32_t last_q16;      // time of the last of them
         uint32_t interval_q16;  // from the last of them to the step after
     };
 
-    Steps steps_before(uint16_t path_ticks, bool ends_segment) const;
-    // False when the last of so many steps comes later than 2^32 can tell.
-    bool find_last(Steps& steps) const;
+    void find_steps(const path_clock::Slice& slice, Steps& steps) const;
+    uint8_t guess(uint16_t path_ticks) const;
+    void find_last(Steps& steps) const;
+    bool fit(const path_clock::Slice& slice, const Steps& steps, uint16_t first_path, Run& run) const;
     void advance(const Steps& steps);
 
     Fixed48 at_;  // path time of the next step, from the segment's start
     uint32_t interval_q16_;
-    int32_t add_q16_;
+    uint32_t add_q16_;  // modulo 2^32
     uint16_t left_;
     uint8_t guess_;  // steps of the segment's slice before; 0: none yet
     bool positive_;
-    bool has_moved_;
     uint32_t last_path_ticks_;  // path time of the last step, from the segment's start, modulo 2^32
     uint32_t last_ticks_;       // its tick
 };

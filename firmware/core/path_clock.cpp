@@ -5,28 +5,25 @@ namespace path_clock {
 
 namespace {
 
-// The change of a slice that is stretched by `stretch` where it changes most, in relation to that: rate x
-// path x stretch^2, in 2^-16.
-uint32_t relative_change(uint32_t rate_path, uint32_t stretch) {
-    return multiply_q32(rate_path, multiply_q16(stretch, stretch));
+// The change of a slice that is stretched by `stretch` where it changes most, in relation to that, and at
+// most `most`: rate x path x stretch^2, in 2^-16.
+uint32_t relative_change(uint32_t rate_path, uint32_t stretch, uint8_t most) {
+    const uint32_t relative = multiply_q32(rate_path, multiply_q16(stretch, stretch));
+    return relative >> 16 < most ? relative : most * ONE;
 }
 
 // At most twice the stretch, so that a quadratic in the number of steps stays a good likeness.
 uint32_t slowed(uint32_t stretch, uint32_t rate_path) {
-    const uint32_t relative = relative_change(rate_path, stretch);
-    return stretch + (relative < ONE ? multiply_q16(stretch, relative) : stretch);
+    return stretch + multiply_q16(stretch, relative_change(rate_path, stretch, 1));
 }
 
 // The root of s + F D s^3 = s0 by Newton's method from above: it comes down to the root and does not pass it
-// but for a rounding, where it ends. So each turn gives a lawful stretch and three are near enough.
+// but for a rounding, where it ends. So each turn gives a lawful stretch and three are near enough. One with
+// a smaller change than there is stays above, too.
 uint32_t sped_up(uint32_t stretch, uint32_t rate_path) {
     uint32_t end = stretch;
     for (uint8_t turn = 0; turn < 3; ++turn) {
-        const uint32_t relative = relative_change(rate_path, end);
-        if (relative >= 8 * ONE) {  // the step is nearly end / 3
-            end -= end >> 2;
-            continue;
-        }
+        const uint32_t relative = relative_change(rate_path, end, 8);
         const uint32_t growth = multiply_q16(end, relative);
         const uint32_t gap = stretch - end;
         if (growth <= gap) break;
@@ -74,14 +71,16 @@ void Slice::follow(const Way& way) {
 uint32_t Slice::stretch_at(uint16_t path) const {
     if (s0_ == s1_) return s0_;
     const uint16_t share = static_cast<uint16_t>(multiply(reciprocal_, path).high);  // of the slice, in 2^-16
-    if (s0_ < s1_) return s0_ + multiply(s1_ - s0_, share).high;
-    return s0_ - multiply(s0_ - s1_, share).high;
+    return multiply(s0_, static_cast<uint16_t>(~share)).high + multiply(s1_, share).high;
 }
 
 uint32_t Slice::stretched_ticks_at(uint16_t path) const {
-    const uint32_t end = stretch_at(path);
-    const uint32_t mean = (s0_ + end + (end < s0_ ? 1 : 0)) >> 1;  // rounded to the start's side
-    return start_ticks_ + multiply(mean, path).high;
+    return start_ticks_ + multiply((s0_ + stretch_at(path)) >> 1, path).high;
+}
+
+uint16_t Slice::stretched(uint16_t ticks, uint16_t path) const {
+    const uint32_t longer = multiply(stretch_at(path), ticks).high;
+    return longer < 0xFFFF ? static_cast<uint16_t>(longer) : 0xFFFF;
 }
 
 }  // namespace path_clock

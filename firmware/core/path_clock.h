@@ -53,9 +53,10 @@ class Slice {
 
     // Path time since the slice's start of a path time of the segment, before the slice's end.
     uint16_t path_of(uint32_t path) const { return static_cast<uint16_t>(path - from_path_); }
-    // The tick of such a path time, and the stretch there.
+    // The tick of such a path time.
     uint32_t ticks_at(uint16_t path) const { return plain_ ? start_ticks_ + path : stretched_ticks_at(path); }
-    uint32_t stretch_at(uint16_t path) const;
+    // A time so short that begins there and lasts as long on the path, saturated.
+    uint16_t stretched(uint16_t ticks, uint16_t path) const;
 
     // The clock stood still.
     void shift(uint32_t ticks) {
@@ -64,6 +65,7 @@ class Slice {
     }
 
   private:
+    uint32_t stretch_at(uint16_t path) const;
     uint32_t stretched_ticks_at(uint16_t path) const;
 
     uint32_t start_ticks_;

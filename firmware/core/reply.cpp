@@ -1,6 +1,5 @@
 #include "reply.h"
 
-#include "framing.h"
 #include "hal_crc.h"
 #include "hal_serial.h"
 #include "hal_signals.h"
@@ -14,59 +13,34 @@ namespace reply {
 
 namespace {
 
-constexpr uint8_t MAX_PAYLOAD = wire::WELCOME_BYTES;
-static_assert(wire::WELCOME_BYTES >= wire::STATUS_BYTES, "the longest reply");
-// Before the payload is read, and behind it; every byte but the delimiter may be stuffed.
-constexpr uint8_t MAX_HEAD = 2 * (wire::HEADER_BYTES + wire::CRC_BYTES);
-constexpr uint8_t MAX_TAIL = 2 * wire::CRC_BYTES + 1;
-
 Boot last_boot;
 
-// The frame as it is sent, from `line` on. It is stuffed from the payload in the same memory: writing two
-// bytes for each one that it reads, it has come as far as the payload's end when it has read it all.
-union {
-    uint8_t line[MAX_HEAD + 2 * MAX_PAYLOAD + MAX_TAIL];
-    struct {
-        uint8_t before[MAX_HEAD + MAX_PAYLOAD];
-        union {
-            wire::Welcome welcome;
-            wire::Status status;
-        };
-    } plain;
-} buffer;
-
-uint8_t* end;  // of what is stuffed
-uint16_t crc;
-
-void stuff(uint8_t byte) {
-    crc = hal::crc_update(crc, byte);
-    if (is_special(byte)) {
-        *end++ = wire::ESCAPE;
-        byte ^= wire::ESCAPE_XOR;
-    }
-    *end++ = byte;
+// The place of a message in the frame to be sent: what follows are the payload's checksum and the delimiter.
+template <typename Message>
+Message& payload() {
+    return *reinterpret_cast<Message*>(hal::reply + hal::MAX_REPLY_BYTES - 1 - wire::CRC_BYTES -
+                                       sizeof(Message));
 }
 
-// The payload's checksum goes on from the header's, so it stays as it is.
-void stuff_checksum() {
-    const uint16_t told = crc;
-    stuff(static_cast<uint8_t>(told));
-    stuff(static_cast<uint8_t>(told >> 8));
-    crc = told;
+// Writes the checksum of the bytes up to `at` there. The payload's goes on from the header's.
+uint8_t* put_checksum(uint8_t* at, uint8_t bytes, uint16_t& crc) {
+    for (const uint8_t* from = at - bytes; from != at;) crc = hal::crc_update(crc, *from++);
+    *at++ = static_cast<uint8_t>(crc);
+    *at++ = static_cast<uint8_t>(crc >> 8);
+    return at;
 }
 
 void send(uint8_t seq, wire::MessageType type, uint8_t size) {
-    const uint8_t* payload = reinterpret_cast<const uint8_t*>(&buffer.plain.status);
-    end = buffer.line;
-    crc = wire::CRC_INITIAL;
-    stuff(size);
-    stuff(seq);
-    stuff(static_cast<uint8_t>(type));
-    stuff_checksum();
-    for (; size != 0; --size) stuff(*payload++);
-    stuff_checksum();
-    *end++ = wire::DELIMITER;
-    hal::serial_send(buffer.line, static_cast<uint8_t>(end - buffer.line));
+    const uint8_t frame = static_cast<uint8_t>(wire::HEADER_BYTES + 2 * wire::CRC_BYTES + 1 + size);
+    uint8_t* at = hal::reply + hal::MAX_REPLY_BYTES - frame;
+    *at++ = size;
+    *at++ = seq;
+    *at++ = static_cast<uint8_t>(type);
+    uint16_t crc = wire::CRC_INITIAL;
+    at = put_checksum(at, wire::HEADER_BYTES, crc);
+    at = put_checksum(at + size, size, crc);
+    *at = wire::DELIMITER;
+    hal::serial_send(frame);
 }
 
 }  // namespace
@@ -74,7 +48,7 @@ void send(uint8_t seq, wire::MessageType type, uint8_t size) {
 void set_boot(const Boot& boot) { last_boot = boot; }
 
 void send_welcome(const session::Report& report, uint32_t host_nonce) {
-    wire::Welcome& told = buffer.plain.welcome;
+    wire::Welcome& told = payload<wire::Welcome>();
     told.protocol_version = wire::PROTOCOL_VERSION;
     told.host_nonce = host_nonce;
     told.boot_nonce = last_boot.nonce;
@@ -90,7 +64,7 @@ void send_welcome(const session::Report& report, uint32_t host_nonce) {
 }
 
 void send_status(const session::Report& report) {
-    wire::Status& told = buffer.plain.status;
+    wire::Status& told = payload<wire::Status>();
     told.mcu_ticks = motion::tell_ledger(told.ledger);
     told.state = supervisor::state();
     told.fault = supervisor::fault();

@@ -1,4 +1,4 @@
-// Builds the device's frames, encoded for the line.
+// Builds the device's frames.
 #pragma once
 
 #include <stdint.h>

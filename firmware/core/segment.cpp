@@ -9,6 +9,10 @@ namespace {
 constexpr uint32_t LEAST_INTERVAL_Q16 = static_cast<uint32_t>(wire::MIN_INTERVAL_TICKS) << 16;
 constexpr uint32_t MOST_INTERVAL_Q16 = static_cast<uint32_t>(wire::MAX_INTERVAL_TICKS) << 16;
 
+bool is_interval(uint32_t ticks_q16) {
+    return ticks_q16 >= LEAST_INTERVAL_Q16 && ticks_q16 <= MOST_INTERVAL_Q16;
+}
+
 }  // namespace
 
 // Intervals change by the same amount each time, so all are in their limits when the first and the last are.
@@ -16,23 +20,18 @@ bool run_ticks(const Move& move, uint32_t& ticks) {
     ticks = 0;
     if (move.steps < 2) return true;
     const uint32_t first = move.interval_q16;
-    if (first < LEAST_INTERVAL_Q16 || first > MOST_INTERVAL_Q16) return false;
     const bool shrinks = move.add_q16 < 0;
     const uint32_t add = static_cast<uint32_t>(move.add_q16);
     const uint32_t change =
         multiply_saturated(shrinks ? 0 - add : add, static_cast<uint16_t>(move.steps - 2));
-    if (change > (shrinks ? first - LEAST_INTERVAL_Q16 : MOST_INTERVAL_Q16 - first)) return false;
-    // n I + n (n - 1) / 2 A for n = steps - 1; the change is (n - 1) A, which is even when n is not.
+    const uint32_t last = shrinks ? first - change : first + change;
+    if ((last < first) != (shrinks && change != 0)) return false;  // does not fit
+    if (!is_interval(first) || !is_interval(last)) return false;
+    // n (first + last) / 2 for n = steps - 1 intervals.
     const uint16_t n = static_cast<uint16_t>(move.steps - 1);
-    Fixed48 time = multiply(first, n);
-    const Fixed48 grown =
-        (n & 1) != 0 ? multiply(change >> 1, n) : multiply(change, static_cast<uint16_t>(n >> 1));
-    if (shrinks) {
-        subtract_from(time, grown);
-    } else {
-        add_to(time, grown);
-    }
-    ticks = time.high;
+    Fixed48 twice = multiply(first, n);
+    add_to(twice, multiply(last, n));
+    ticks = twice.high >> 1;
     return true;
 }
 

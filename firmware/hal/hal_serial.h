@@ -3,7 +3,11 @@
 
 #include <stdint.h>
 
+#include "messages.h"
+
 namespace hal {
+
+namespace wire = planarm::wire;
 
 // Switches the USART on. Interrupts are still off.
 void serial_init();
@@ -15,8 +19,13 @@ void serial_drop(uint8_t count);
 // True when no reply is being sent.
 bool serial_can_send();
 
-// Sends `size` bytes (at least one), which must stay in place meanwhile.
-void serial_send(const uint8_t* bytes, uint8_t size);
+// The reply being sent, unstuffed: it ends with this buffer.
+constexpr uint8_t MAX_REPLY_BYTES = wire::HEADER_BYTES + 2 * wire::CRC_BYTES + wire::WELCOME_BYTES + 1;
+static_assert(wire::WELCOME_BYTES >= wire::STATUS_BYTES, "the longest reply");
+extern uint8_t reply[MAX_REPLY_BYTES];
+
+// Sends the last `size` bytes of it, all but the last of them stuffed on the way.
+void serial_send(uint8_t size);
 
 // Bytes lost in the USART, and bytes lost because the ring was full; both modulo 256.
 uint8_t serial_overruns();

@@ -14,7 +14,7 @@ from planarm_wire.layout import EACH_JOINT, END, Field
 
 PROTOCOL_VERSION: Final = 2
 """Both ends must have the same."""
-SPEC_HASH: Final = 0xE8A26478
+SPEC_HASH: Final = 0xC5DF0400
 """Hash of the specification without its wording."""
 DELIMITER: Final = 0x7E
 """Ends every frame."""
@@ -54,7 +54,7 @@ RX_RING_BYTES: Final = 128
 """Receive ring of the firmware."""
 HOST_WINDOW_BYTES: Final = 112
 """Most unacknowledged bytes, as encoded, the host may have in flight."""
-QUEUE_BYTES: Final = 896
+QUEUE_BYTES: Final = 848
 """Of the board uno: bytes of queued segments it holds; a SEGMENTS frame takes its payload and queue_frame_bytes."""
 QUEUE_FRAME_BYTES: Final = 1
 """Bytes that each queued SEGMENTS frame takes besides its payload."""
@@ -107,7 +107,7 @@ BOARDS: Final[dict[str, Board]] = {
         doc="Own wiring, two joints: every step rises by Timer1's compare outputs, on its tick",
         pin_map="own",
         joints=2,
-        queue_bytes=896,
+        queue_bytes=848,
         min_interval_ticks=225,
         step_pins=("D9", "D10"),
         dir_pins=("D4", "D5"),
@@ -133,7 +133,7 @@ BOARDS: Final[dict[str, Board]] = {
         doc="The Arduino CNC shield as it is, slots X and Y: every step rises in an interrupt",
         pin_map="cnc_shield",
         joints=2,
-        queue_bytes=896,
+        queue_bytes=848,
         min_interval_ticks=320,
         step_pins=("D2", "D3"),
         dir_pins=("D5", "D6"),

@@ -14,7 +14,21 @@ import pytest
 
 from firmware_board import LEAD_TICKS, Board, Schedule, end_motion, run_of, segment_of
 from firmware_tracer import INTERRUPTS_ON, LAP, RECEIVE, STEP_1, STEP_2, TRANSMIT, Tracer
-from planarm_wire.messages import STEP_PINS, Fault, Query, Segment, Segments, Start
+from planarm_wire.codec import encode
+from planarm_wire.framing import encode_frame
+from planarm_wire.messages import (
+    DELIMITER,
+    ESCAPE,
+    PROTOCOL_VERSION,
+    RESERVED,
+    STEP_PINS,
+    Fault,
+    Hello,
+    Query,
+    Segment,
+    Segments,
+    Start,
+)
 
 IMAGE = Path(__file__).parents[2] / "firmware" / "release" / "uno.hex"
 JUMP_TO_ITSELF = b"\xff\xcf"  # rjmp .-2
@@ -23,7 +37,7 @@ STEP_CYCLES, ONWARD_CYCLES, REVERSED_CYCLES, IDLE_CYCLES = 75, 75, 77, 73
 MISSED_CYCLES = 82
 HIGH_CYCLES = range(56, 60)  # nothing else runs but an instruction of the main program
 RECEIVE_CYCLES, OVERRUN_CYCLES, FULL_CYCLES = 40, 44, 40
-TRANSMIT_CYCLES = (34, 36)
+TRANSMIT_CYCLES, ESCAPE_CYCLES, DELIMITER_CYCLES = 34, 39, 35
 LAP_CYCLES = 18
 
 
@@ -73,7 +87,7 @@ def test_step_interrupts(tracer: Tracer, joint: int) -> None:
         IDLE_CYCLES,
     ]
     assert tracer.taken(RECEIVE) <= {RECEIVE_CYCLES}
-    assert tracer.taken(TRANSMIT) <= set(TRANSMIT_CYCLES)
+    assert tracer.taken(TRANSMIT) <= {TRANSMIT_CYCLES, ESCAPE_CYCLES, DELIMITER_CYCLES}
     assert tracer.taken(LAP) == {LAP_CYCLES}
     if joint == 0:
         assert set(highs(board)) <= set(HIGH_CYCLES)
@@ -101,13 +115,26 @@ def test_receive_interrupt(tracer: Tracer) -> None:
     board.send(Query())
     board.run(40_000)
     assert tracer.taken(RECEIVE) == {RECEIVE_CYCLES}
-    assert tracer.taken(TRANSMIT) == set(TRANSMIT_CYCLES)
     # Four bytes while interrupts are off: one more than the USART holds.
     tracer.done.clear()
     board.receive(bytes(4))
     tracer.hold_interrupts(5 * 640)
     board.run(2000)
     assert tracer.taken(RECEIVE) == {RECEIVE_CYCLES, OVERRUN_CYCLES}
+
+
+def test_transmit_interrupt(tracer: Tracer) -> None:
+    # WELCOME brings the host's number back, whose bytes are all to be escaped.
+    board = Board(tracer)
+    tracer.run(40_000)
+    tracer.done.clear()
+    nonce = bytes([*RESERVED, ESCAPE, DELIMITER])
+    board.receive(encode_frame(0, *encode(Hello(PROTOCOL_VERSION, int.from_bytes(nonce, "little")))))
+    tracer.run(100_000)
+    sent = [cycles for number, cycles in tracer.done if number == TRANSMIT]
+    assert set(sent) == {TRANSMIT_CYCLES, ESCAPE_CYCLES, DELIMITER_CYCLES}
+    assert sent.count(ESCAPE_CYCLES) >= len(nonce)
+    assert sent.count(DELIMITER_CYCLES) == 1 and sent[-1] == DELIMITER_CYCLES
 
 
 def test_receive_interrupt_without_room(tracer: Tracer) -> None:

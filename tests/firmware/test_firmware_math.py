@@ -21,6 +21,7 @@ ROUNDS = 60
 # With call and return, as firmware/hal/uno/hal_math.h tells them.
 CYCLES = {
     "multiply": (51, 51),
+    "multiply_low": (59, 59),
     "multiply_saturated": (61, 64),
     "multiply_q16": (165, 169),
     "multiply_q32": (165, 169),
@@ -95,6 +96,7 @@ def test_a_product_of_48_bits(chip: Chip) -> None:
 @pytest.mark.parametrize(
     ("name", "b_bytes", "expected"),
     [
+        ("multiply_low", 2, lambda a, b: a * b % 2**32),
         ("multiply_saturated", 2, lambda a, b: min(a * b, 2**32 - 1)),
         ("multiply_q16", 4, lambda a, b: min(a * b >> 16, 2**32 - 1)),
         ("multiply_q32", 4, lambda a, b: a * b >> 32),
@@ -109,18 +111,17 @@ def test_products_of_32_bits(chip: Chip, name: str, b_bytes: int, expected: Call
     assert low <= min(chip.cycles) <= max(chip.cycles) <= high
 
 
-@pytest.mark.parametrize(("name", "sign"), [("add_to", 1), ("subtract_from", -1)])
-def test_sums_of_48_bits(chip: Chip, name: str, sign: int) -> None:
+def test_sums_of_48_bits(chip: Chip) -> None:
     def stored(high: int, low: int) -> bytes:
         return high.to_bytes(4, "little") + low.to_bytes(2, "little")
 
     for high, term_high in chip.values():
         low, term_low = chip.chance.choice(EDGES) & 0xFFFF, chip.chance.getrandbits(16)
         chip.write(SUM, stored(high, low))
-        chip.call(name, r24=(SUM, 2), r18=(term_high, 4), r22=(term_low, 2))
-        total = ((high << 16 | low) + sign * (term_high << 16 | term_low)) % 2**48
+        chip.call("add_to", r24=(SUM, 2), r18=(term_high, 4), r22=(term_low, 2))
+        total = ((high << 16 | low) + (term_high << 16 | term_low)) % 2**48
         assert chip.read(SUM, 6) == stored(total >> 16, total & 0xFFFF)
-    assert (min(chip.cycles), max(chip.cycles)) == CYCLES[name]
+    assert (min(chip.cycles), max(chip.cycles)) == CYCLES["add_to"]
 
 
 def test_a_quotient(chip: Chip) -> None:

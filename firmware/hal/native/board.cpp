@@ -3,6 +3,7 @@
 #include <deque>
 
 #include "firmware.h"
+#include "framing.h"
 #include "hal_journal.h"
 #include "hal_pins.h"
 #include "hal_serial.h"
@@ -221,9 +222,17 @@ void serial_drop(uint8_t count) { uno.ring_tail = static_cast<uint8_t>(uno.ring_
 
 bool serial_can_send() { return uno.now >= uno.sending_until; }
 
-void serial_send(const uint8_t* bytes, uint8_t size) {
-    uno.sent.insert(uno.sent.end(), bytes, bytes + size);
-    uno.sending_until = uno.now + static_cast<uint64_t>(size) * board::TICKS_A_BYTE;
+uint8_t reply[MAX_REPLY_BYTES];
+
+void serial_send(uint8_t size) {
+    const size_t before = uno.sent.size();
+    for (const uint8_t* at = reply + MAX_REPLY_BYTES - size; at != reply + MAX_REPLY_BYTES - 1; ++at) {
+        const bool special = planarm::is_special(*at);
+        if (special) uno.sent.push_back(wire::ESCAPE);
+        uno.sent.push_back(special ? *at ^ wire::ESCAPE_XOR : *at);
+    }
+    uno.sent.push_back(wire::DELIMITER);
+    uno.sending_until = uno.now + (uno.sent.size() - before) * board::TICKS_A_BYTE;
 }
 
 uint8_t serial_overruns() { return 0; }

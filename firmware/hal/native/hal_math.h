@@ -13,6 +13,11 @@ inline Fixed48 multiply(uint32_t a, uint16_t b) {
     return {static_cast<uint32_t>(product >> 16), static_cast<uint16_t>(product)};
 }
 
+// a b modulo 2^32.
+inline uint32_t multiply_low(uint32_t a, uint16_t b) {
+    return static_cast<uint32_t>(static_cast<uint64_t>(a) * b);
+}
+
 // a b; a b / 2^16 and a b / 2^32, rounded down: 2^32 - 1 when it does not fit.
 inline uint32_t saturated(uint64_t value) {
     return value > 0xFFFFFFFF ? 0xFFFFFFFF : static_cast<uint32_t>(value);
@@ -27,14 +32,10 @@ inline uint32_t multiply_q32(uint32_t a, uint32_t b) {
 
 inline uint64_t whole(Fixed48 value) { return (static_cast<uint64_t>(value.high) << 16) | value.low; }
 
+// sum += term.
 inline void add_to(Fixed48& sum, Fixed48 term) {
     const uint64_t total = whole(sum) + whole(term);
     sum = {static_cast<uint32_t>(total >> 16), static_cast<uint16_t>(total)};
-}
-
-inline void subtract_from(Fixed48& sum, Fixed48 term) {
-    const uint64_t rest = whole(sum) - whole(term);
-    sum = {static_cast<uint32_t>(rest >> 16), static_cast<uint16_t>(rest)};
 }
 
 // 2^16 a / b, rounded down; it must fit.

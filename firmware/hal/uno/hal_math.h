@@ -11,15 +11,17 @@ namespace hal {
 // a b, in 48 bits; 51 cycles.
 Fixed48 multiply(uint32_t a, uint16_t b);
 
+// a b modulo 2^32; 59 cycles.
+uint32_t multiply_low(uint32_t a, uint16_t b);
+
 // a b; a b / 2^16 and a b / 2^32, rounded down: 2^32 - 1 when it does not fit. 61 to 64 cycles, and 165
 // to 169.
 uint32_t multiply_saturated(uint32_t a, uint16_t b);
 uint32_t multiply_q16(uint32_t a, uint32_t b);
 uint32_t multiply_q32(uint32_t a, uint32_t b);
 
-// sum += term and sum -= term; 39 cycles.
+// sum += term; 39 cycles.
 void add_to(Fixed48& sum, Fixed48 term);
-void subtract_from(Fixed48& sum, Fixed48 term);
 
 // 2^16 a / b, rounded down; it must fit. 685 to 717 cycles.
 uint32_t divide_q16(uint32_t a, uint8_t b);

@@ -88,6 +88,15 @@ extern "C" __attribute__((naked, noinline, used)) void planarm_scale() {
         )" ::[multiply] "i"(multiply));
 }
 
+__attribute__((naked, noinline)) uint32_t multiply_low(uint32_t, uint16_t) {
+    __asm__ __volatile__(
+        R"(
+        call %x[multiply]
+        movw r24, r18
+        ret
+        )" ::[multiply] "i"(multiply));
+}
+
 __attribute__((naked, noinline)) uint32_t multiply_saturated(uint32_t, uint16_t) {
     __asm__ __volatile__(
         R"(
@@ -128,7 +137,7 @@ __attribute__((naked, noinline)) uint32_t multiply_q32(uint32_t, uint32_t) {
         )");
 }
 
-// The sum's address in r25 and r24; the term's high in r21 to r18, its low in r23 and r22.
+// The sum's address in r25 and r24; the term as `multiply` returns it.
 __attribute__((naked, noinline)) void add_to(Fixed48&, Fixed48) {
     __asm__ __volatile__(
         R"(
@@ -150,32 +159,6 @@ __attribute__((naked, noinline)) void add_to(Fixed48&, Fixed48) {
         std  Z + 2, r24
         ldd  r24, Z + 3
         adc  r24, r21
-        std  Z + 3, r24
-        ret
-        )");
-}
-
-__attribute__((naked, noinline)) void subtract_from(Fixed48&, Fixed48) {
-    __asm__ __volatile__(
-        R"(
-        movw r30, r24
-        ldd  r24, Z + 4
-        sub  r24, r22
-        std  Z + 4, r24
-        ldd  r24, Z + 5
-        sbc  r24, r23
-        std  Z + 5, r24
-        ldd  r24, Z + 0
-        sbc  r24, r18
-        std  Z + 0, r24
-        ldd  r24, Z + 1
-        sbc  r24, r19
-        std  Z + 1, r24
-        ldd  r24, Z + 2
-        sbc  r24, r20
-        std  Z + 2, r24
-        ldd  r24, Z + 3
-        sbc  r24, r21
         std  Z + 3, r24
         ret
         )");

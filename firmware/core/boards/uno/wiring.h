@@ -11,7 +11,7 @@ namespace wire {
 // Joints that segments and ledger tell of.
 constexpr uint8_t JOINTS = 2;
 // Bytes of queued segments it holds; a SEGMENTS frame takes its payload and queue_frame_bytes.
-constexpr uint16_t QUEUE_BYTES = 896U;
+constexpr uint16_t QUEUE_BYTES = 848U;
 // Least time between two steps of one joint.
 constexpr uint8_t MIN_INTERVAL_TICKS = 225;
 // The pin map own.
