@@ -294,7 +294,7 @@ def test_busy_leaves_no_trace_of_the_segments(board: Board) -> None:
     late_end = segment_of(20_001, run_of(1, first=20_000))
     early_end = segment_of(20_000, run_of(1, first=0))
     left = fill(board, Segments(0, 0, 0, (early_end,)))
-    late = Segments(0, 0, 0, (late_end, early_end))
+    late = Segments(0, 0, 0, (late_end, early_end, early_end))
     assert encoded_bytes(late) > left
     board.ask(late)
     board.seq -= 1
