@@ -459,3 +459,13 @@ def _move(chance: random.Random, ticks: int, least_ticks: int) -> Move:
     room = min((ticks - 2 * margin - 20) // steps, 50_000)
     interval = chance.randrange((least_ticks + 10) << 8, room << 8)
     return Move(steps_dir, first, interval, chance.randrange(-(10 << 16) // steps, (10 << 16) // steps))
+
+
+def frames_written(line: ModelLine) -> list[Frame]:
+    """Return all that the host wrote, as frames."""
+    return [frame for frame in FrameDecoder().feed(bytes(line.written)) if isinstance(frame, Frame)]
+
+
+def after(line: ModelLine, t_s: float, action) -> None:
+    """Do something to the line at a time of its clock."""
+    line.events.at(t_s, action)

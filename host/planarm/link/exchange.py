@@ -12,9 +12,10 @@ from planarm.errors import DeviceFault, LinkError
 from planarm.link.clock_sync import ClockReading, Span
 from planarm.link.knock import ask_expected
 from planarm.link.margin import Margin
+from planarm.link.pace import PERCENT
 from planarm.link.position import Known, Meeting, PositionReport, StreamError, StreamFault, judge
 from planarm.link.session import Session, SessionLimits, fault_words
-from planarm.link.stream import PERCENT, Joining, Phase, Stream, StreamOptions, StreamProgress
+from planarm.link.stream import Joining, Phase, Stream, StreamOptions, StreamProgress
 from planarm.link.stream_values import config_of
 from planarm.link.transport import Transport
 from planarm_wire.boards import Board
@@ -96,12 +97,12 @@ def stream_plan(
     try:
         _drive_with_keyboard(transport, session, stream, steer)
     except KeyboardInterrupt as stop:
-        if stream.ledger_before is None:
+        if stream.course.before is None:
             raise
         position, _ = _find_position(transport, session, stream)
         raise StreamError("left by the keyboard before the arm had come to rest", position) from stop
     except (LinkError, DeviceFault) as error:
-        if stream.ledger_before is None:  # nothing was queued yet, so nothing moved
+        if stream.course.before is None:  # nothing was queued yet, so nothing moved
             raise
         position, fault = _find_position(transport, session, stream)
         if not isinstance(error, DeviceFault):
@@ -236,16 +237,16 @@ def _meeting(session: Session) -> Meeting:
 
 
 def _report(stream: Stream, session: Session, met: Meeting | None) -> PositionReport:
-    before, told = stream.ledger_before, _meeting(session)
+    before, told = stream.course.before, _meeting(session)
     assert before is not None, "a motion begins with a ledger"
     # What was sent since the last reply may have set an arm at rest in motion, so nothing is said of rest here.
     known = Known(told.boot_nonce, before, told.status, stream.sent_segments, rested=False)
-    return judge(known, met, stream.steps, stream.released_spread_usteps)
+    return judge(known, met, stream.course.steps, stream.released_spread_usteps)
 
 
 def _result(session: Session, now_s: float, began_s: float, stream: Stream | None = None) -> StreamResult:
     assert session.welcome is not None and session.status is not None
-    before = stream.ledger_before if stream else session.status.ledger
+    before = stream.course.before if stream else session.status.ledger
     assert before is not None, "a motion begins with a ledger"
     return StreamResult(
         boot_nonce=session.welcome.boot_nonce,
@@ -262,8 +263,8 @@ def _result(session: Session, now_s: float, began_s: float, stream: Stream | Non
         crc_errors=session.line.crc_errors,
         bytes_lost=session.line.overruns + session.line.ring_full,
         damaged_replies=session.line.damaged_replies,
-        path_clock_percent=stream.path_clock_percent if stream else PERCENT,
-        margin=stream.margin if stream else None,
+        path_clock_percent=stream.pace.percent if stream else PERCENT,
+        margin=stream.pace.margin if stream else None,
         least_queued=stream.least_queued if stream else 0,
         cleared_fault=stream.cleared_fault if stream else Fault.NONE,
         began_s=stream.began_s if stream else None,

@@ -12,15 +12,15 @@ says when it is done. A hold that nobody here asked for, as a damaged byte may c
 from bisect import bisect_left
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from itertools import accumulate
 
-from planarm.errors import CertificateError, LinkError, StepsDifferError
+from planarm.errors import CertificateError, LinkError
 from planarm.link.clock_sync import Span
-from planarm.link.margin import Margin, SeenLine, fill_queue, line_margin
+from planarm.link.course import Course
+from planarm.link.pace import PERCENT, Pace
 from planarm.link.packing import Packer
-from planarm.link.path_time import PathTime
-from planarm.link.plan_steps import LOOK_AHEAD, PlanSteps
-from planarm.link.position import MissedStartError, executed_since, moved_usteps
+from planarm.link.plan_steps import LOOK_AHEAD
+from planarm.link.position import MissedStartError
+from planarm.link.progress import progress_of
 from planarm.link.session import Session
 from planarm.link.stream_values import AT_EASE, Joining, Phase, StreamOptions, StreamProgress, config_of
 from planarm_wire.codec import encoded_bytes
@@ -32,7 +32,6 @@ from planarm_wire.messages import (
     Enable,
     Fault,
     HostMessage,
-    Ledger,
     Override,
     Query,
     Resume,
@@ -43,14 +42,13 @@ from planarm_wire.messages import (
     Stop,
 )
 from planarm_wire.rates import Allowance
-from planarm_wire.steps import duration_ticks, is_last
+from planarm_wire.steps import duration_ticks
 from planarm_wire.wirings import board_of
 
 __all__ = ["AT_EASE", "PERCENT", "Joining", "Phase", "Stream", "StreamOptions", "StreamProgress", "config_of"]
 
 MIN_POLL_S = 0.002  # a status and its question take 1.5 ms of the line
 MAX_POLL_S = 0.050  # keeps progress alive during long segments
-PERCENT = 100
 
 
 class Stream:
@@ -70,10 +68,8 @@ class Stream:
         joining: Joining | None = None,
         warn: Callable[[str], None] | None = None,
     ) -> None:
-        _check_ends(segments)
-        self.steps = PlanSteps.of(segments)
+        self.course = Course(segments)
         self.phase = Phase.OPENING
-        self.ledger_before: Ledger | None = None
         self.cleared_fault = Fault.NONE
         self.started_s = 0.0
         self.wake_s = float("inf")
@@ -81,25 +77,14 @@ class Stream:
         self.least_queued = len(segments)
         self.stopped = False
         self.unasked_holds = 0
-        self.path_clock_percent = PERCENT
-        self.margin: Margin | None = None
-        self._warn = warn
-        self._line: SeenLine | None = None
-        self._asked_percent = PERCENT
-        self._filling_since_s = 0.0
-        self._filled_from_bytes = 0
         self._start_sent_s, self._lead_ticks_sent = 0.0, 0
         self._session = session
-        self._segments = tuple(segments)
         self._options = options or StreamOptions()
         self._board = board_of(len(segments[0].moves), self._options.wiring)
+        self.pace = Pace(session, self._board, warn)
         self._on_progress = on_progress
-        self._ends_ticks = tuple(accumulate((duration_ticks(segment) for segment in segments), initial=0))
-        self._path_time = PathTime(self._segments, self._ends_ticks, self.steps)
         self._seen: Status | None = None
         self._told_resent = 0
-        self._executed = 0
-        self._executed_s = 0.0
         self._packer = Packer(session, segments, self._options.allowances)
         self._joining = joining
         self._hold_wanted = False
@@ -129,7 +114,7 @@ class Stream:
     @property
     def total_segments(self) -> int:
         """Segments of the plan."""
-        return len(self._segments)
+        return len(self.course.segments)
 
     # -- what the owner may ask of a motion ---------------------------------------------------------------------------
 
@@ -145,7 +130,7 @@ class Stream:
 
     def override(self, percent: int) -> None:
         """Let the path clock run at 1 to 100 % of the planned rate."""
-        self._asked_percent = percent
+        self.pace.asked_percent = percent
         self._orders.append(Override(percent))
 
     def stop(self, *, quick: bool = False) -> None:
@@ -169,17 +154,16 @@ class Stream:
         Raises:
             CertificateError: it has other first segments, or does not end as a plan does.
         """
-        _check_ends(segments)
         sent = self.sent_segments
-        if tuple(segments[:sent]) != self._segments[:sent] or len(allowances) != len(segments):
+        if tuple(segments[:sent]) != self.course.segments[:sent] or len(allowances) != len(segments):
             raise CertificateError(f"a plan to go on with has other segments than the {sent} that were sent")
-        self._segments = tuple(segments)
-        self.steps = PlanSteps.of(segments)
-        self._ends_ticks = tuple(accumulate((duration_ticks(segment) for segment in segments), initial=0))
-        self._path_time = PathTime(self._segments, self._ends_ticks, self.steps)
+        self.course.take(segments)
         self._options = replace(self._options, allowances=tuple(allowances))
         self._packer.go_on_with(segments, allowances)
-        self._set_path_clock_again()
+        executed = self.course.executed
+        order = self.pace.set_again(self.course.segments[executed:], self._options.allowances[executed:])
+        if order is not None:
+            self._orders.append(order)
 
     @property
     def deadline_s(self) -> float:
@@ -238,9 +222,9 @@ class Stream:
         if self._status.state not in (State.RUNNING, State.READY, *AT_EASE):
             raise LinkError(f"the device does not hold the motion any more: it is {self._status.state.name.lower()}")
         self._session.guarded = True
-        self.ledger_before = joining.before
+        self.course.before = joining.before
         self._packer.sent = joining.accepted_segments
-        self.started_s = self._executed_s = now_s
+        self.started_s = self.course.executed_s = now_s
         self.phase = Phase.RUNNING
         self._follow(now_s)
 
@@ -264,43 +248,19 @@ class Stream:
         if self._status.state is not State.READY:
             raise LinkError(f"the device took ENABLE but reports {self._status.state.name.lower()}; reset the board")
         self._session.guarded = True
-        self.ledger_before = self._status.ledger
-        self._filling_since_s = now_s
-        self._filled_from_bytes = self._session.arq_counters.bytes_taken
+        self.course.before = self._status.ledger
+        self.pace.begin_filling(now_s)
         self.phase = Phase.FILLING
 
     def _fill(self, now_s: float) -> None:
         self._send_segments(now_s)
         if self._session.idle:  # the queue is full, or the whole plan is in it
-            self._set_path_clock(now_s)
+            self.pace.set(self.course.segments, self.sent_segments, self._options.allowances, now_s)
+            if self._status.override_percent != self.pace.percent:
+                self._session.send(Override(self.pace.percent), now_s)
             self._start_sent_s, self._lead_ticks_sent = now_s, self._lead_ticks(now_s)
             self._session.send(Start(self._lead_ticks_sent), now_s)
             self.phase = Phase.STARTING
-
-    def _set_path_clock(self, now_s: float) -> None:
-        """Let the path clock run as planned, or slower where the line was not seen to carry the plan."""
-        seen = self._session.arq_counters.bytes_taken - self._filled_from_bytes
-        self._line = SeenLine.of(seen, now_s - self._filling_since_s, self._session.quickest_s)
-        if self.sent_segments < len(self._segments):
-            margin = line_margin(self._segments, self.sent_segments, self._line, self._board, self._options.allowances)
-            self.margin, self.path_clock_percent = margin, margin.percent
-            if margin.percent < PERCENT and self._warn is not None:
-                self._warn(str(margin))
-        if self._status.override_percent != self.path_clock_percent:
-            self._session.send(Override(self.path_clock_percent), now_s)
-
-    def _set_path_clock_again(self) -> None:
-        """The same for what is left, seen from a full queue; while it fills the device slows down by itself."""
-        if self._line is None:
-            return
-        left, allowances = self._segments[self._executed :], self._options.allowances[self._executed :]
-        margin = line_margin(left, fill_queue(left, self._board), self._line, self._board, allowances)
-        if margin.percent == self.path_clock_percent:
-            return
-        self.margin, self.path_clock_percent = margin, margin.percent
-        self._orders.append(Override(min(margin.percent, self._asked_percent)))
-        if margin.percent < PERCENT and self._warn is not None:
-            self._warn(f"from here on {margin}")
 
     def _lead_ticks(self, now_s: float) -> int:
         """Return the time from START to the first segment."""
@@ -313,16 +273,16 @@ class Stream:
 
     def _begin_running(self, now_s: float) -> None:
         if self._session.idle:
-            self.started_s = self._executed_s = now_s
+            self.started_s = self.course.executed_s = now_s
             lead_s = self._lead_ticks_sent / TICKS_HZ
             self.began_s = Span(self._start_sent_s + lead_s, self._session.made_s.most + lead_s)
             self.phase = Phase.RUNNING
 
     def _run(self, now_s: float) -> None:
         if self._status.state is State.READY:
-            self.stopped = self._stop_wanted and self._executed < len(self._segments)
+            self.stopped = self._stop_wanted and self.executed_segments < self.total_segments
             if not self.stopped:
-                self._check_ledger()
+                self.course.check_done(self._status.ledger)
             if self._options.release_when_done:
                 self._session.guarded = False
                 self._session.send(Enable(0), now_s)
@@ -357,7 +317,7 @@ class Stream:
         while (message := self._packer.next_message()) is not None:
             if self._packer.payload_bytes > self._credit or not self._session.fits(message):
                 return
-            if self._wanted_from() > self._executed:
+            if self._wanted_from() > self.executed_segments:
                 return
             self._session.send(message, now_s)
             self._packer.take()
@@ -371,25 +331,25 @@ class Stream:
         """Return how many segments have to be executed before the device is to have the next."""
         if self._options.ahead_s is None or not self._options.allowances or self._status.state is State.STARVED:
             return 0
-        running = self._options.allowances[self._executed : self._executed + LOOK_AHEAD]
+        executed, ends_ticks = self.executed_segments, self.course.ends_ticks
+        running = self._options.allowances[executed : executed + LOOK_AHEAD]
         need_ticks = max((allowance.need_ticks for allowance in running), default=0.0)
         ahead_ticks = need_ticks + self._options.ahead_s * TICKS_HZ
-        return bisect_left(self._ends_ticks, self._ends_ticks[self.sent_segments] - ahead_ticks)
+        return bisect_left(ends_ticks, ends_ticks[self.sent_segments] - ahead_ticks)
 
     def _poll_due_s(self) -> float:
         """When the device can have room for the next message, or can have ended."""
-        message = self._packer.next_message()
-        until = self._executed
-        if message is None:
-            until = len(self._segments)
+        executed = until = self.executed_segments
+        if self._packer.next_message() is None:
+            until = self.total_segments
         else:  # a segment gives its bytes back when it is begun
             wanted = self._packer.payload_bytes - self._credit
-            while wanted > 0 and until < len(self._segments):
-                wanted -= encoded_bytes(self._segments[until])
+            while wanted > 0 and until < self.total_segments:
+                wanted -= encoded_bytes(self.course.segments[until])
                 until += 1
             until = max(until, self._wanted_from())
-        wait_s = (self._ends_ticks[until] - self._ends_ticks[self._executed]) / TICKS_HZ
-        wait_s *= PERCENT / max(1, min(self._status.rate_percent, self.path_clock_percent))
+        wait_s = self.course.between_s(executed, until)
+        wait_s *= PERCENT / max(1, min(self._status.rate_percent, self.pace.percent))
         return self._session.status_s + min(max(wait_s, MIN_POLL_S), MAX_POLL_S)
 
     # -- following the device -----------------------------------------------------------------------------------------
@@ -403,7 +363,7 @@ class Stream:
     @property
     def executed_segments(self) -> int:
         """Whole segments of this plan executed, by the last status."""
-        return self._executed
+        return self.course.executed
 
     def path_span_s(self, now_s: float, slowness: float) -> Span:
         """Return where on the path the motion is by now, by the last status.
@@ -412,31 +372,23 @@ class Stream:
             now_s: later than the status.
             slowness: by how much the device's clock may be faster than this one, as a share.
         """
-        if self.ledger_before is None:
+        if self.course.before is None:
             return Span(0.0, 0.0)
-        span_s = self._path_time.span_s(self._executed, moved_usteps(self.ledger_before, self._status.ledger))
+        span_s = self.course.span_s(self._status.ledger)
         since_s = max(0.0, now_s - self._session.made_s.least)
         return Span(span_s.least, span_s.most + (1.0 + slowness) * since_s)
 
     def _follow(self, now_s: float) -> None:
         status = self._session.status
-        if status is None or self.ledger_before is None:
+        if status is None or self.course.before is None:
             return
         if status is self._seen:
             self._tell_resent(status, now_s)
             return
         self._seen = status
-        executed = executed_since(self.ledger_before, status.ledger)
-        if executed > self.sent_segments:
-            raise LinkError(
-                f"the device tells {executed} executed segments, but only {self.sent_segments} were sent;"
-                " another program speaks to it, or host and firmware disagree"
-            )
-        if executed != self._executed:
-            self._executed, self._executed_s = executed, now_s
-        queued = self.sent_segments - executed
-        if self.phase is Phase.RUNNING and self.sent_segments < len(self._segments):
-            self.least_queued = min(self.least_queued, queued)
+        self.course.follow(status.ledger, self.sent_segments, now_s)
+        if self.phase is Phase.RUNNING and self.sent_segments < self.total_segments:
+            self.least_queued = min(self.least_queued, self.sent_segments - self.executed_segments)
         self._tell(status, now_s)
 
     def _tell_resent(self, status: Status, now_s: float) -> None:
@@ -447,69 +399,27 @@ class Stream:
     def _tell(self, status: Status, now_s: float) -> None:
         self._told_resent = len(self._session.resent)
         if self._on_progress is not None:
-            self._on_progress(self._progress(status, now_s))
+            told = progress_of(self.course, self._session, status, self.sent_segments, now_s)
+            self._learn_when_it_began(told.path_span_s)
+            self._on_progress(told)
 
-    def _progress(self, status: Status, now_s: float) -> StreamProgress:
-        assert self.ledger_before is not None
-        moved = moved_usteps(self.ledger_before, status.ledger)
-        made_s, path_s = self._session.made_s, self._path_time.span_s(self._executed, moved)
-        if self.began_s is not None and path_s.least > 0.0:  # it began so long before, or longer where it was slowed
+    def _learn_when_it_began(self, path_s: Span) -> None:
+        """Take what a place on the path proves: it began so long before, or longer where it was slowed."""
+        if self.began_s is not None and path_s.least > 0.0:
             by_now_s = self._session.board_clock.host_s(-round(path_s.least * TICKS_HZ)).most
             self.began_s = Span(self.began_s.least, min(self.began_s.most, by_now_s))
-        return StreamProgress(
-            path_s=self._ends_ticks[self._executed] / TICKS_HZ,
-            total_s=self._ends_ticks[-1] / TICKS_HZ,
-            executed_segments=self._executed,
-            total_segments=len(self._segments),
-            queued_segments=self.sent_segments - self._executed,
-            queued_s=(self._ends_ticks[self.sent_segments] - self._ends_ticks[self._executed]) / TICKS_HZ,
-            moved_usteps=moved,
-            state=status.state,
-            at_s=now_s,
-            free_bytes=status.free_bytes,
-            retransmissions=self._session.arq_counters.retransmissions,
-            rate_percent=status.rate_percent,
-            made_s=made_s,
-            path_span_s=path_s,
-            resent=tuple(self._session.resent),
-        )
 
     def _stall_due_s(self) -> float:
         """When the running segment should long have ended; never while the path clock rests or runs slowly."""
         if self._status.state in AT_EASE or self._status.rate_percent < PERCENT:
             return float("inf")
-        running = min(self._executed, len(self._segments) - 1)
-        ticks = duration_ticks(self._segments[running]) + self._options.lead_ticks
-        return self._executed_s + ticks / TICKS_HZ + self._session.limits.silence_s
+        running = min(self.executed_segments, self.total_segments - 1)
+        ticks = duration_ticks(self.course.segments[running]) + self._options.lead_ticks
+        return self.course.executed_s + ticks / TICKS_HZ + self._session.limits.silence_s
 
     def _stall_words(self, now_s: float) -> str:
+        waited_s, of = now_s - self.course.executed_s, self.total_segments
         return (
-            f"the device answers but executes nothing: segment {self._executed} of {len(self._segments)} has not ended"
-            f" {now_s - self._executed_s:.2f} s after the one before it; reset the board"
-        )
-
-    def _check_ledger(self) -> None:
-        """Compare what the device executed with the plan, segment count and steps of every joint."""
-        assert self.ledger_before is not None
-        if self._executed != len(self._segments):
-            raise LinkError(
-                f"the device ended its motion after {self._executed} of {len(self._segments)} segments without a fault;"
-                " host and firmware disagree: flash the released image"
-            )
-        executed = moved_usteps(self.ledger_before, self._status.ledger)
-        planned = self.steps.planned_usteps()
-        for joint, (done, meant) in enumerate(zip(executed, planned, strict=True), start=1):
-            if done != meant:
-                raise StepsDifferError(
-                    f"joint {joint} moved by {done:+d} usteps by the device's ledger, the plan has {meant:+d}"
-                    f" ({done - meant:+d}); home the arm before the next motion"
-                )
-
-
-def _check_ends(segments: Sequence[Segment]) -> None:
-    ends = [index for index, segment in enumerate(segments) if is_last(segment)]
-    if ends != [len(segments) - 1]:
-        raise CertificateError(
-            f"the plan has {len(segments)} segments and marks {ends} as the last of the motion; only the very last one"
-            " may be and must be marked: plan the scene again"
+            f"the device answers but executes nothing: segment {self.executed_segments} of {of} has not ended"
+            f" {waited_s:.2f} s after the one before it; reset the board"
         )
