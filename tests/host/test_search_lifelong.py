@@ -8,13 +8,14 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
+from planarm.search.ahead import SOON, begin_ahead, is_lost, new_ahead
 from planarm.search.digraph import BELOW_ONE, Bounds, bound, digraph
 from planarm.search.incremental import Changes, GraphPlanner, landmarks
 from planarm.search.indexed_heap import new_heap, put, take_out
-from planarm.search.lifelong import DONE, best_first, change, new_lifelong, repair
+from planarm.search.lifelong import DONE, best_first, change, mark_stored, new_lifelong, repair
 from planarm.search.read_off import gradient_path, stored_path
 from planarm.search.result import SearchStatus
-from planarm.search.stored_tree import TOO_MANY, change_stored
+from planarm.search.stored_tree import TOO_MANY, change_costs, change_stored
 
 ALGORITHMS = ("roadmap_a_star", "d_star_lite", "mpd_star_lite")
 
@@ -95,9 +96,9 @@ def test_all_equal_dijkstra_after_every_change_of_random_graphs(sized):
             GraphPlanner(graph, bounds, (start, made.goal), name, always_repair=k < 3)
             for k, (graph, name) in enumerate(zip(graphs, names, strict=True))
         ]
+        found = [planner.solve() for planner in planners]
         for _ in range(8):
             wanted = dijkstra(graphs[0], made.goal).get(start, math.inf)
-            found = [planner.solve() for planner in planners]
             for name, graph, answer in zip(names, graphs, found, strict=True):
                 assert answer.cost == pytest.approx(wanted, rel=1e-9), (seed, name)
                 if wanted == math.inf:
@@ -113,8 +114,13 @@ def test_all_equal_dijkstra_after_every_change_of_random_graphs(sized):
             edited = made.edit() if rng.random() < 0.7 else None  # or the start has moved, and nothing else
             for planner in planners:
                 planner.move_start(start)
+            if edited is not None and rng.random() < 0.5:
+                found = [planner.replan(edited) for planner in planners]  # in one call
+                continue
+            for planner in planners:
                 if edited is not None:
                     planner.change(edited)
+            found = [planner.solve() for planner in planners]
     assert answers == sized(40, 2000) * 8
 
 
@@ -124,7 +130,7 @@ def test_the_stored_path_is_the_one_that_the_gradient_gives(seed):
     rng = random.Random(seed)
     made = RandomGraph(rng, parallel=False)
     graph, start = made.graph(), rng.randrange(made.count)
-    state = new_lifelong(made.count, start, made.goal, stores=True)
+    state = new_lifelong(graph, start, made.goal, stores=True)
     bounds = made.bounds()
     for _ in range(6):
         assert repair(graph, bounds, state) == DONE
@@ -156,8 +162,9 @@ def test_what_rises_cuts_off_the_branch_behind_it_and_nothing_else(seed):
     rng = random.Random(seed)
     made = RandomGraph(rng, parallel=False)
     graph, bounds, start = made.graph(), made.bounds(), rng.randrange(made.count)
-    state, room = new_lifelong(made.count, start, made.goal, stores=True), np.empty(made.count, np.int64)
+    state, room = new_lifelong(graph, start, made.goal, stores=True), np.empty(made.count, np.int64)
     assert best_first(graph, bounds, state) == DONE
+    mark_stored(state)
     for _ in range(6):
         before, edited = state.g.copy(), made.edit()
         rises = edited.costs > graph.cost[edited.edges]
@@ -181,8 +188,9 @@ def test_a_branch_that_is_too_large_is_left_and_told():
     room = np.empty(5, np.int64)
     for most, wanted in ((4, 4), (3, TOO_MANY), (0, TOO_MANY)):
         graph.cost[:] = 1.0
-        state = new_lifelong(5, 4, 0, stores=True)
+        state = new_lifelong(graph, 4, 0, stores=True)
         assert best_first(graph, Bounds.none(5), state) == DONE
+        mark_stored(state)
         changed = (np.array([0]), np.array([2.0]))
         assert change_stored(graph, Bounds.none(5), state, changed, most, room) == wanted
         assert graph.cost[0] == 2.0  # told in either case
@@ -217,7 +225,7 @@ class Walk:
     def run(self, *, stores, keep_modifier):
         """Walk until the goal is reached or known to be out of reach; return replans and wrong distances."""
         goal = self.size**2 - 1
-        state = new_lifelong(self.size**2, 0, goal, stores=stores)
+        state = new_lifelong(self.graph, 0, goal, stores=stores)
         at, replans, wrong = 0, 0, 0
         for _ in range(6 * self.size**2):
             if at == goal:
@@ -298,6 +306,50 @@ def test_the_first_answer_is_searched_from_the_start_and_distances_are_settled_w
     assert third.work.expanded == 0
 
 
+def test_a_flood_tells_whether_there_is_a_way_and_a_search_after_it_which(sized):
+    """Walls of random width across a grid: the start is walled in, or the way leads through a gap far away."""
+    lost = 0
+    for seed in range(sized(60, 600)):
+        rng, size = random.Random(seed), 30
+        walk = Walk(seed, size, share=rng.choice([0.0, 0.15, 0.3]))
+        start, goal = rng.randrange(size) * size + rng.randrange(10), rng.randrange(size) * size + rng.randrange(20, 30)
+        planner = GraphPlanner(walk.graph, Bounds.none(size * size), (start, goal), "mpd_star_lite")
+        planner.solve()
+        gap, column = rng.choice([-9, rng.randrange(size)]), rng.randrange(10, 19)
+        walled = (np.arange(size * size) % size == column) & (np.abs(np.arange(size * size) // size - gap) > 1)
+        edges = np.flatnonzero(walled[walk.tail] | walled[walk.head])
+        answer = planner.replan(Changes(edges, np.full(len(edges), np.inf)))
+        wanted = dijkstra(walk.graph, goal).get(start, math.inf)
+        assert answer.cost == pytest.approx(wanted), seed
+        lost += wanted == math.inf and answer.work.expanded == SOON
+    assert lost > sized(10, 100)  # told by the flood
+
+
+def test_a_flood_comes_to_a_whole_way_or_to_all_that_can_be_reached():
+    for seed in range(200):
+        rng = random.Random(seed)
+        made = RandomGraph(rng)
+        graph, start = made.graph(), rng.randrange(made.count)
+        state, ahead = new_lifelong(graph, start, made.goal, stores=True), new_ahead(graph)
+        assert best_first(graph, Bounds.none(made.count), state) == DONE
+        mark_stored(state)
+        edges = np.array(rng.sample(range(len(made.tail)), len(made.tail) // 3))
+        closed = np.full(len(edges), np.inf)
+        change_costs(graph, state, edges, closed, np.empty(made.count, np.int64), 0)
+        begin_ahead(Bounds.none(made.count), state, ahead)
+        told = is_lost(graph, state, ahead)
+        shut = set(edges.tolist())
+        ways = [
+            (t, h) for e, (t, h) in enumerate(zip(made.tail.tolist(), made.head.tolist(), strict=True)) if e not in shut
+        ]
+        came, before = {start}, 0
+        while len(came) > before:
+            before = len(came)
+            came |= {h for t, h in ways if t in came}
+        assert told == (made.goal not in came), seed
+        assert not told or ahead.counted[4] == len(came)
+
+
 def test_next_to_the_goal_nearly_every_stored_way_is_cut_and_the_search_begins_anew():
     count = 400
     nodes = np.arange(count)
@@ -349,8 +401,10 @@ def test_several_rises_before_anybody_asks_and_a_fall_after_them(sized):
             if rng.random() < 0.4:
                 start = rng.randrange(made.count)
                 planner.move_start(start)
-            for _ in range(rng.choice([0, 1, 1, 2])):
-                answer = planner.solve()
+            for k in range(rng.choice([0, 1, 1, 2])):
+                told = np.array(rng.sample(range(len(made.tail)), 2))
+                rises = Changes(told, graph.cost[told] * rng.choice([1.0, 2.0, math.inf]))
+                answer = planner.replan(rises) if k == 0 and rng.random() < 0.4 else planner.solve()
                 wanted = dijkstra(graph, made.goal).get(start, math.inf)
                 assert answer.cost == pytest.approx(wanted, rel=1e-9), seed
                 if wanted < math.inf:

@@ -14,7 +14,7 @@ from planarm.experiments.mpdstar_scenes import bench_scene, random_scene
 from planarm.model.shapes import Circle, obstacle_set
 from planarm.roadmap.graph import Roadmap
 from planarm.roadmap.planning import way_energy_j
-from planarm.search.incremental import Changes, GraphAlgorithm, GraphAnswer, GraphPlanner
+from planarm.search.incremental import GraphAlgorithm, GraphAnswer, GraphPlanner
 from planarm.workspace.joint_proof import link_ends, pose_spare_cm
 
 Floats = NDArray[np.float64]
@@ -125,7 +125,7 @@ def _both_plans(roadmap: Roadmap, ends: tuple[int, int], shape: Circle) -> tuple
         roadmap.graph.cost[changes.edges] = free_costs
         planner = GraphPlanner(roadmap.graph, roadmap.bounds(), ends, algorithm, always_repair=True)
         firsts.append(_timed(planner.solve))
-        agains.append(_timed(lambda planner=planner: _changed(planner, changes)))  # type: ignore[misc]
+        agains.append(_timed(lambda planner=planner: planner.replan(changes)))  # type: ignore[misc]
     opened = roadmap.remove_obstacle(number)
     roadmap.graph.cost[opened.edges] = opened.costs
     for answers in (firsts, agains):
@@ -133,11 +133,6 @@ def _both_plans(roadmap: Roadmap, ends: tuple[int, int], shape: Circle) -> tuple
         if not np.allclose(costs, costs[0], rtol=1e-9, atol=0.0):
             raise ValueError(f"the algorithms disagree: {costs}")
     return firsts, agains
-
-
-def _changed(planner: GraphPlanner, changes: Changes) -> GraphAnswer:
-    planner.change(changes)
-    return planner.solve()
 
 
 def _timed(solve: Callable[[], GraphAnswer]) -> Timed:

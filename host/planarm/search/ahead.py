@@ -6,6 +6,9 @@ way to the goal is still whole has that distance for certain, so the search ends
 to, and the rest of the path is read off the stored tree. Where the new way is much longer than the old one, nearly all
 nodes look good by their old distances: then it gives up, and the distances are repaired first.
 
+When it has not ended soon it asks whether there is a way at all: a flood from the start, which has no order to keep and
+so takes a tenth of an expansion a node, comes to a node whose stored way is whole, or to all that can be reached.
+
 Bounds from earlier searches: S. Koenig, M. Likhachev, "Adaptive A*", AAMAS 2005; ends at a stored path: C. Hernandez,
 J. Baier, R. Asin, "Making A* run faster than D*-Lite for path-planning in partially known terrain", ICAPS 2014.
 
@@ -20,9 +23,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from planarm.search.digraph import Bounds, Digraph, bound
+from planarm.search.digraph import Bounds, Digraph, Links, bound
 from planarm.search.indexed_heap import Heap, new_heap, put, take_out
-from planarm.search.lifelong import DONE, GOAL, START, Lifelong
+from planarm.search.lifelong import CLOSED, DONE, GOAL, START, Lifelong
 from planarm_wire.kernel_cache import bare_kernel as kernel
 
 Floats = NDArray[np.float64]
@@ -35,38 +38,128 @@ NOBODY = -1
 GAVE_UP = -2
 BEGIN = -3
 
+SOON = 48
+"""Nodes that are expanded before the start's surroundings are flooded."""
+ASKED = 8
+"""One of so many flooded nodes is asked whether its stored way is whole."""
+
 
 class Ahead(NamedTuple):
     """Room for a search from the start on n nodes, as it is left between two searches."""
 
     distance: Floats
     """From the start; infinite where the search did not come."""
-    before: Ints
+    before: Links
     """The node before each on the way from the start."""
     mark: Marks
     heap: Heap
-    visited: Ints
-    """Nodes that have a distance or a mark: to be cleared."""
+    visited: Links
+    """Nodes that have a distance or a mark: to be cleared; shape (2 n,)."""
     counted: Ints
-    """How many of these; then nodes expanded, nodes put, and edges looked at; shape (4,)."""
+    """How many of these; then nodes expanded, nodes put, edges looked at, and nodes flooded; shape (5,)."""
+    flooded: Marks
+    """Nodes that a flood has come to."""
+    waiting: Links
+    """The same in the order in which it came to them, and room for the neighbours of one."""
     limit: Floats
     """C of the last search that expanded from the goal, shape (1,)."""
     limit_start: Ints
     """Its start, shape (1,)."""
 
 
-def new_ahead(nodes: int) -> Ahead:
+def new_ahead(graph: Digraph) -> Ahead:
     """Return the room."""
+    nodes, most = graph.nodes, int(np.diff(graph.out_first).max(initial=0))
     return Ahead(
         distance=np.full(nodes, np.inf),
-        before=np.full(nodes, NOBODY, np.int64),
+        before=np.full(nodes, NOBODY, np.int32),
         mark=np.zeros(nodes, np.int8),
         heap=new_heap(nodes),
-        visited=np.empty(2 * nodes, np.int64),
-        counted=np.zeros(4, np.int64),
+        visited=np.zeros(2 * nodes, np.int32),
+        counted=np.zeros(5, np.int64),
+        flooded=np.zeros(nodes, np.int8),
+        waiting=np.zeros(nodes + most, np.int32),
         limit=np.zeros(1),
         limit_start=np.zeros(1, np.int64),
     )
+
+
+@kernel
+def answer_ahead(
+    graph: Digraph, bounds: Bounds, state: Lifelong, ahead: Ahead, most: int, needing: int, path: Ints
+) -> tuple[int, int, float]:
+    """Find the best path after costs have risen; arguments as for `search_ahead`, and room for a path, shape (n,).
+
+    Returns:
+        (DONE, how many nodes the path has, 0 for no path, and its cost); or (what else `search_ahead` returns, 0, 0).
+    """
+    start = state.ends[START]
+    if needing == BEGIN and (start == ahead.limit_start[0] or state.g[start] < np.inf):
+        count = stored_way(state, path)
+        if count:  # it was the best, and is whole
+            _count_nothing(ahead)
+            return DONE, count, float(min(state.g[start], state.rhs[start]))
+    found, whole = search_ahead(graph, bounds, state, ahead, min(SOON, most), needing)
+    if found == GAVE_UP:
+        if ahead.counted[4] == 0 and is_lost(graph, state, ahead):
+            return DONE, 0, np.inf
+        if most > SOON:
+            found, whole = search_ahead(graph, bounds, state, ahead, most, GAVE_UP)
+    if found != DONE:
+        return found, 0, 0.0
+    if whole == NOBODY:
+        return DONE, 0, np.inf
+    return DONE, path_ahead(state, ahead, whole, path), ahead.distance[whole] + state.g[whole]
+
+
+@kernel
+def stored_way(state: Lifelong, path: Ints) -> int:
+    """Fill in the nodes from the start by the stored successors; return how many, or 0 when they are cut off."""
+    u, count = state.ends[START], 0
+    while u >= 0:
+        path[count] = u
+        count += 1
+        if u == state.ends[GOAL]:
+            return count
+        u = state.best[u]
+    return 0
+
+
+@kernel
+def _count_nothing(ahead: Ahead) -> None:
+    for k in range(1, 5):
+        ahead.counted[k] = 0
+
+
+@kernel
+def is_lost(graph: Digraph, state: Lifelong, ahead: Ahead) -> bool:
+    """Tell whether no node whose stored way is whole can be reached from the start; the goal is such a node.
+
+    Edges are open that no change has closed. Its time goes into branches that no processor foresees, so there are few:
+    first all neighbours are listed that were not flooded, then those are taken to which the edge is open; and only some
+    nodes are asked whether their stored way is whole, since their neighbours mostly are what they are.
+    """
+    flooded, waiting, out_first, out_head = ahead.flooded, ahead.waiting, graph.out_first, graph.out_head
+    flooded[:] = 0
+    waiting[0] = state.ends[START]
+    flooded[waiting[0]], count, done = 1, 1, 0
+    while done < count:
+        u = waiting[done]
+        if done % ASKED == 0 and _leads_on(state, ahead, u):
+            break
+        done += 1
+        new = np.uint64(count)  # unsigned, since Numba asks of other indices whether they are negative
+        for k in range(np.uint64(out_first[u]), np.uint64(out_first[u + 1])):
+            waiting[new] = np.int32(k)
+            new += np.uint64(flooded[np.uint32(out_head[k])] == 0)
+        for i in range(np.uint64(count), new):
+            v, e = np.uint32(out_head[np.uint32(waiting[i])]), np.uint32(graph.out_edge[np.uint32(waiting[i])])
+            closed = (state.edge_marks[e >> np.uint32(4)] >> (np.uint32(2) * (e & np.uint32(15)))) & np.uint32(CLOSED)
+            if closed == 0 and flooded[v] == 0:  # parallel edges are listed twice
+                flooded[v], waiting[np.uint64(count)] = 1, v
+                count += 1
+    ahead.counted[4] = count
+    return done == count and flooded[state.ends[GOAL]] == 0
 
 
 @kernel
@@ -74,6 +167,8 @@ def search_ahead(
     graph: Digraph, bounds: Bounds, state: Lifelong, ahead: Ahead, most: int, needing: int
 ) -> tuple[int, int]:
     """Search from the start to the first node whose stored way is whole; `needing` is BEGIN, or what it returned last.
+
+    After GAVE_UP it may go on with a larger `most`.
 
     Costs have only risen since the search began anew; edges that did, and are on stored ways, have cut these (their
     tails store no successor).
@@ -93,12 +188,14 @@ def search_ahead(
             return GAVE_UP, NOBODY
         counted[1] += 1
         counted[3] += graph.out_first[u + 1] - graph.out_first[u]
-        for k in range(graph.out_first[u], graph.out_first[u + 1]):
-            v, cost = graph.out_head[k], graph.cost[graph.out_edge[k]]
+        so_far = distance[u]
+        for k in range(np.uint64(graph.out_first[u]), np.uint64(graph.out_first[u + 1])):
+            cost = graph.cost[np.uint32(graph.out_edge[k])]
             if np.isnan(cost):
-                return int(v), NOBODY
-            through = distance[u] + cost
-            if through < distance[v]:
+                return int(graph.out_head[k]), NOBODY
+            through = so_far + cost
+            if through < distance[np.uint32(graph.out_head[k])]:
+                v = graph.out_head[k]
                 if distance[v] == np.inf:
                     ahead.visited[counted[0]] = v
                     counted[0] += 1
@@ -121,7 +218,7 @@ def begin_ahead(bounds: Bounds, state: Lifelong, ahead: Ahead) -> None:
     start = state.ends[START]
     ahead.distance[start], ahead.visited[0] = 0.0, start
     ahead.counted[0] = 1
-    ahead.counted[1] = ahead.counted[2] = ahead.counted[3] = 0
+    _count_nothing(ahead)
     put(ahead.heap, start, _to_goal(bounds, state, ahead, start), 0.0)
 
 
@@ -137,9 +234,13 @@ def _to_goal(bounds: Bounds, state: Lifelong, ahead: Ahead, u: int) -> float:
 @kernel
 def _is_whole(state: Lifelong, ahead: Ahead, u: int) -> bool:
     """Tell whether a node's stored way leads to the goal; what is found is kept for all nodes on it."""
+    return bool(state.g[u] < np.inf and _leads_on(state, ahead, u))
+
+
+@kernel
+def _leads_on(state: Lifelong, ahead: Ahead, u: int) -> bool:
+    """Follow the stored successors, to the goal or to what is told, and mark all on the way."""
     goal, at = state.ends[GOAL], u
-    if state.g[u] == np.inf:
-        return False
     while at != goal and at >= 0 and ahead.mark[at] == UNTOLD:
         at = state.best[at]
     found = at == goal or (at >= 0 and ahead.mark[at] == WHOLE)

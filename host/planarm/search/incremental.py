@@ -10,7 +10,8 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from planarm.search.ahead import BEGIN, GAVE_UP, new_ahead, path_ahead, search_ahead
+from planarm.search.ahead import BEGIN, GAVE_UP, answer_ahead, new_ahead
+from planarm.search.at_once import FELL, UNCUT, plan_anew, replan_ahead
 from planarm.search.digraph import Bounds, Digraph, Floats, Ints
 from planarm.search.lifelong import (
     COUNTERS,
@@ -23,8 +24,10 @@ from planarm.search.lifelong import (
     UPDATED,
     best_first,
     change,
+    mark_stored,
     new_lifelong,
     repair,
+    start_over,
 )
 from planarm.search.read_off import gradient_path, stored_path
 from planarm.search.result import SearchStatus
@@ -59,8 +62,7 @@ class Changes(NamedTuple):
     costs: Floats
 
 
-@dataclass(frozen=True, slots=True)
-class Work:
+class Work(NamedTuple):
     """What one `solve` did."""
 
     expanded: int
@@ -113,12 +115,13 @@ class GraphPlanner:
         self._always_repair = always_repair
         self._last_anew = 0
         self._fresh = True
-        self._branch = np.empty(graph.nodes, np.int64)
+        self._branch = np.zeros(graph.nodes, np.int64)
         self._roots = 0
         self._answered = self._fell = False
-        self._ahead = new_ahead(graph.nodes)
-        self._limit = 0.0, 0
-        self._start_over(*ends)
+        self._ahead = new_ahead(graph)
+        self._path = np.zeros(graph.nodes, np.int64)
+        self._state = new_lifelong(graph, *ends, stores=algorithm != "d_star_lite")
+        self._most_ahead = max(LEAST_AHEAD, int(AHEAD_SHARE * graph.nodes))
 
     @property
     def start(self) -> int:
@@ -128,7 +131,7 @@ class GraphPlanner:
     def solve(self) -> GraphAnswer:
         """Return the best path from the start as it is now."""
         if self._algorithm == "roadmap_a_star":
-            self._start_over(self.start, int(self._state.ends[GOAL]))
+            self._start_over()
         if self._roots and not self._answered:
             self._answered = True
             if (answer := self._solve_ahead()) is not None:
@@ -139,9 +142,11 @@ class GraphPlanner:
         search = best_first if self._fresh and self._state.stores else repair
         while (needing := search(self._graph, self._bounds, self._state)) != DONE:
             self._ask_for(needing)
-        self._fresh, self._limit = False, (float(self._state.rhs[self.start]), self.start)
+        self._fresh = False
+        self._ahead.limit[0], self._ahead.limit_start[0] = self._state.rhs[self.start], self.start
         counted = self._state.counted - before
-        if anew:
+        if anew and self._algorithm == "mpd_star_lite":
+            mark_stored(self._state)
             self._last_anew = int(counted[EXPANDED])
         return self._answer(counted, anew)
 
@@ -152,13 +157,39 @@ class GraphPlanner:
             change(self._graph, self._bounds, self._state, edges, costs)
         elif self._fresh or self._algorithm == "roadmap_a_star":
             self._graph.cost[edges] = costs
-            self._start_over(self.start, int(self._state.ends[GOAL]))
         else:
             self._roots, falls = change_costs(self._graph, self._state, edges, costs, self._branch, self._roots)
             self._answered = False
             self._fell = self._fell or falls
             if self._fell or self._always_repair:  # old distances are no bounds any more, or nobody wants them
                 self._settle(edges if falls else edges[:0])
+
+    def replan(self, changes: Changes) -> GraphAnswer:
+        """Do what `change` and `solve` do, in one call of a kernel where that can be."""
+        graph, bounds, state, path = self._graph, self._bounds, self._state, self._path
+        edges, costs = changes
+        if self._algorithm == "roadmap_a_star":
+            before = int(state.counted[EXPANDED]), int(state.counted[LOOKED])
+            needing, count, cost = plan_anew(graph, bounds, state, edges, costs, path)
+            if needing != DONE:
+                return self.solve()
+            expanded, looked = int(state.counted[EXPANDED]) - before[0], int(state.counted[LOOKED]) - before[1]
+            return self._told(count, cost, Work(expanded, 0, looked, 0, count), anew=True)
+        if not state.stores or self._fresh or self._fell or self._always_repair:
+            self.change(changes)
+            return self.solve()
+        outcome, count, cost, self._roots = replan_ahead(
+            graph, bounds, state, self._ahead, edges, costs, self._branch, self._roots, self._most_ahead, path
+        )
+        self._answered = True
+        if outcome == DONE:
+            return self._told_ahead(count, cost)
+        if outcome == FELL:
+            self._fell = True
+            self._settle(edges)
+        elif outcome != UNCUT and (answer := self._go_on_ahead(outcome)) is not None:
+            return answer
+        return self.solve()
 
     def _settle(self, fallen: Ints = NO_EDGES) -> None:
         """Make the state ready for a repair, after all changes that were told; or begin anew where that is cheaper."""
@@ -168,37 +199,35 @@ class GraphPlanner:
         count = cut_off(self._graph, self._bounds, self._state, fallen, most, self._branch, self._roots)
         self._roots = 0
         if count == TOO_MANY:
-            self._start_over(self.start, int(self._state.ends[GOAL]))
+            self._start_over()
 
     def _solve_ahead(self) -> GraphAnswer | None:
         """Return the best path after costs have risen, by a search from the start; None where that is too much work.
 
         Distances are settled later.
         """
-        state, start = self._state, self.start
-        if start == self._limit[1] or state.g[start] < np.inf:  # its stored way was the best
-            nodes, read_off = stored_path(state)
-            if nodes[-1] == state.ends[GOAL]:
-                cost = float(min(state.g[start], state.rhs[start]))
-                return GraphAnswer(SearchStatus.FOUND, nodes, cost, Work(0, 0, 0, 0, read_off), anew=False)
-        ahead, most = self._ahead, max(LEAST_AHEAD, int(AHEAD_SHARE * self._graph.nodes))
-        ahead.limit[0], ahead.limit_start[0] = self._limit
-        needing = BEGIN
-        while (found := search_ahead(self._graph, self._bounds, state, ahead, most, needing))[0] >= 0:
-            needing = found[0]
-            self._ask_for(needing)
-        if found[0] == GAVE_UP:
-            return None
-        whole = found[1]
-        if whole < 0:
-            nodes, cost = np.empty(0, np.int64), np.inf
-        else:
-            room = np.empty(self._graph.nodes, np.int64)
-            nodes = room[: path_ahead(state, ahead, whole, room)].copy()
-            cost = float(ahead.distance[whole] + state.g[whole])
-        _, expanded, updated, looked = (int(count) for count in ahead.counted)
-        status = SearchStatus.FOUND if len(nodes) else SearchStatus.NO_PATH
-        return GraphAnswer(status, nodes, cost, Work(expanded, updated, looked, 0, len(nodes)), anew=False)
+        return self._go_on_ahead(BEGIN)
+
+    def _go_on_ahead(self, needing: int) -> GraphAnswer | None:
+        """Go on with a search from the start, from what `answer_ahead` returned last or from BEGIN."""
+        while needing != GAVE_UP:
+            if needing >= 0:
+                self._ask_for(needing)
+            needing, count, cost = answer_ahead(
+                self._graph, self._bounds, self._state, self._ahead, self._most_ahead, needing, self._path
+            )
+            if needing == DONE:
+                return self._told_ahead(count, cost)
+        return None
+
+    def _told_ahead(self, count: int, cost: float) -> GraphAnswer:
+        expanded, updated, looked, _ = self._ahead.counted[1:].tolist()
+        return self._told(count, cost, Work(expanded, updated, looked, 0, count), anew=False)
+
+    def _told(self, count: int, cost: float, work: Work, *, anew: bool) -> GraphAnswer:
+        """Return the answer whose path, of so many nodes, a kernel has filled in."""
+        status = SearchStatus.FOUND if count else SearchStatus.NO_PATH
+        return GraphAnswer(status, self._path[:count].copy(), cost, work, anew)
 
     def _ask_for(self, node: int) -> None:
         if self._costing is None:
@@ -209,9 +238,8 @@ class GraphPlanner:
         """Tell that paths begin at another node from now on."""
         self._state.ends[START] = node
 
-    def _start_over(self, start: int, goal: int) -> None:
-        stores = self._algorithm != "d_star_lite"
-        self._state = new_lifelong(self._graph.nodes, start, goal, stores=stores)
+    def _start_over(self) -> None:
+        start_over(self._state)
         self._fresh, self._fell, self._roots = True, False, 0
 
     def _answer(self, counted: Ints, anew: bool) -> GraphAnswer:
@@ -246,7 +274,7 @@ def landmarks(graph: Digraph, nodes: Ints) -> Floats:
 
 def _all_distances(graph: Digraph, node: int, forwards: bool) -> Floats:
     """Return every node's distance from a node, or to it, shape (n,); infinite where there is no way."""
-    state = new_lifelong(graph.nodes, NOWHERE, node, stores=True)
+    state = new_lifelong(graph, NOWHERE, node, stores=True)
     if best_first(graph.turned() if forwards else graph, Bounds.none(graph.nodes), state) != DONE:
         raise ValueError("landmarks need the costs of all edges")
     return state.g

@@ -12,14 +12,15 @@ from planarm_wire.kernel_cache import bare_kernel as kernel
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
+Links = NDArray[np.int32]
 
 
 class Heap(NamedTuple):
     """Room for n nodes."""
 
-    nodes: Ints
+    nodes: Links
     """The nodes in heap order; shape (n,)."""
-    place: Ints
+    place: Links
     """Where each node stands in the heap, -1 for nowhere; shape (n,)."""
     keys: Floats
     """The keys in heap order, beside the nodes; shape (n, 2)."""
@@ -29,7 +30,7 @@ class Heap(NamedTuple):
 
 def new_heap(nodes: int) -> Heap:
     """Return an empty heap with room for so many nodes."""
-    return Heap(np.empty(nodes, np.int64), np.full(nodes, -1, np.int64), np.empty((nodes, 2)), np.zeros(1, np.int64))
+    return Heap(np.zeros(nodes, np.int32), np.full(nodes, -1, np.int32), np.zeros((nodes, 2)), np.zeros(1, np.int64))
 
 
 @kernel

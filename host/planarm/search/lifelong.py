@@ -25,13 +25,14 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from planarm.search.digraph import Bounds, Digraph, bound
+from planarm.search.digraph import Bounds, Digraph, Links, bound
 from planarm.search.indexed_heap import Heap, new_heap, put, take_out
 from planarm_wire.kernel_cache import bare_kernel as kernel
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Flags = NDArray[np.bool_]
+Words = NDArray[np.uint32]
 
 DONE = -1
 """A search has ended; any number from 0 on is a node whose incoming costs are needed."""
@@ -42,6 +43,15 @@ COUNTERS = 4
 
 START, LAST, GOAL = 0, 1, 2
 
+STORED, CLOSED = 1, 2
+"""Marks of edges: it leads to a stored successor, or did; its cost was told to be infinite. A search need not look at
+edges without the first when costs rise, and may look at those without the second for being open."""
+ALL_CLOSED = 0xAAAAAAAA
+"""CLOSED of all edges of a word."""
+
+TOLD = 1024
+"""Edges whose costs are taken in one go."""
+
 TIE = 1e-12
 """Nodes whose key is the start's but for rounding are expanded, too: g along the path must be exact."""
 
@@ -51,8 +61,15 @@ class Lifelong(NamedTuple):
 
     g: Floats
     rhs: Floats
-    best: Ints
+    best: Links
     """The successor that gives rhs, -1 where there is none; kept only when `stores` is true."""
+    through: Links
+    """The edge to `best` of each node that `best_first` gave one."""
+    edge_marks: Words
+    """STORED and CLOSED of each edge, two bits, 16 edges a word, so that all of them stay in the nearest cache; kept
+    only when `stores` is true."""
+    told: Links
+    """Room for edges, while costs are told."""
     stale: Flags
     """True for nodes whose rhs is infinite, or that of some successors only, until their turn comes; D* Lite's."""
     heap: Heap
@@ -66,12 +83,16 @@ class Lifelong(NamedTuple):
     """True for MPD* Lite, false for D* Lite."""
 
 
-def new_lifelong(nodes: int, start: int, goal: int, *, stores: bool) -> Lifelong:
+def new_lifelong(graph: Digraph, start: int, goal: int, *, stores: bool) -> Lifelong:
     """Return the state before anything is searched."""
+    nodes = graph.nodes
     state = Lifelong(
         g=np.full(nodes, np.inf),
         rhs=np.full(nodes, np.inf),
-        best=np.full(nodes, -1, np.int64),
+        best=np.full(nodes, -1, np.int32),
+        through=np.full(nodes, -1, np.int32),
+        edge_marks=np.zeros(len(graph.cost) // 16 + 1, np.uint32),
+        told=np.zeros(TOLD, np.int32),
         stale=np.zeros(nodes, np.bool_),
         heap=new_heap(nodes),
         key_modifier=np.zeros(1),
@@ -82,6 +103,21 @@ def new_lifelong(nodes: int, start: int, goal: int, *, stores: bool) -> Lifelong
     state.rhs[goal] = 0.0
     put(state.heap, goal, 0.0, 0.0)
     return state
+
+
+@kernel
+def start_over(state: Lifelong) -> None:
+    """Make a state what it was before anything was searched."""
+    for u in range(state.g.shape[0]):
+        state.g[u] = state.rhs[u] = np.inf
+        state.best[u], state.stale[u], state.heap.place[u] = -1, False, -1
+    for word in range(state.edge_marks.shape[0]):
+        state.edge_marks[word] &= np.uint32(ALL_CLOSED)
+    state.heap.size[0] = 0
+    state.key_modifier[0] = 0.0
+    state.ends[LAST] = state.ends[START]
+    state.rhs[state.ends[GOAL]] = 0.0
+    put(state.heap, state.ends[GOAL], 0.0, 0.0)
 
 
 @kernel
@@ -159,6 +195,7 @@ def _tell_lower(graph: Digraph, bounds: Bounds, state: Lifelong, u: int) -> bool
         missing = missing or np.isnan(cost)
         if cost + value < rhs[p] and p != state.ends[GOAL]:
             rhs[p], state.best[p] = cost + value, u
+            set_mark(state, graph.in_edge[k], STORED)
             update(bounds, state, p)
     state.counted[LOOKED] += graph.in_first[u + 1] - graph.in_first[u]
     return missing
@@ -191,16 +228,32 @@ def compare_all(graph: Digraph, state: Lifelong, u: int) -> None:
 
     Costs of edges to nodes that were never expanded may be unknown; their g is infinite.
     """
-    least, best = np.inf, -1
+    least, best, edge = np.inf, -1, -1
     for k in range(graph.out_first[u], graph.out_first[u + 1]):
         v = graph.out_head[k]
         if state.g[v] < np.inf:
             through = graph.cost[graph.out_edge[k]] + state.g[v]
             if through < least:
-                least, best = through, v
+                least, best, edge = through, v, graph.out_edge[k]
+    if edge >= 0:
+        set_mark(state, edge, STORED)
     state.rhs[u], state.best[u], state.stale[u] = least, best, False
     state.counted[RESCANNED] += 1
     state.counted[LOOKED] += graph.out_first[u + 1] - graph.out_first[u]
+
+
+@kernel
+def set_mark(state: Lifelong, edge: int, mark: int) -> None:
+    """Set STORED or CLOSED of an edge."""
+    state.edge_marks[np.uint64(edge >> 4)] |= np.uint32(mark << (2 * (edge & 15)))
+
+
+@kernel
+def mark_stored(state: Lifelong) -> None:
+    """Mark all edges to stored successors after `best_first`."""
+    for u in range(state.best.shape[0]):
+        if state.best[u] >= 0:
+            set_mark(state, state.through[u], STORED)
 
 
 @kernel
@@ -228,11 +281,13 @@ def best_first(graph: Digraph, bounds: Bounds, state: Lifelong) -> int:
         if u == start:
             return DONE
         value, missing = rhs[u], False
-        for k in range(graph.in_first[u], graph.in_first[u + 1]):
-            cost, p = graph.cost[graph.in_edge[k]], graph.in_tail[k]
+        # Unsigned, since Numba asks of other indices whether they are negative.
+        for k in range(np.uint64(graph.in_first[u]), np.uint64(graph.in_first[u + 1])):
+            cost = graph.cost[np.uint32(graph.in_edge[k])]
             missing = missing or np.isnan(cost)
-            if cost + value < rhs[p] and g[p] == np.inf:
-                rhs[p], state.best[p] = cost + value, u
+            if cost + value < rhs[np.uint32(graph.in_tail[k])] and g[np.uint32(graph.in_tail[k])] == np.inf:
+                p = graph.in_tail[k]
+                rhs[p], state.best[p], state.through[p] = cost + value, u, graph.in_edge[k]
                 put(heap, p, rhs[p] + bound(bounds, start, p), rhs[p])
         state.counted[LOOKED] += graph.in_first[u + 1] - graph.in_first[u]
         if missing:  # what was told holds; the rest is told when the costs are there

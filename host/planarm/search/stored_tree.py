@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from planarm.search.digraph import Bounds, Digraph
 from planarm.search.indexed_heap import take_out
-from planarm.search.lifelong import GOAL, Lifelong, compare_all, follow_start, update
+from planarm.search.lifelong import CLOSED, GOAL, STORED, Lifelong, compare_all, follow_start, set_mark, update
 from planarm_wire.kernel_cache import bare_kernel as kernel
 
 Floats = NDArray[np.float64]
@@ -60,15 +60,25 @@ def change_costs(
     Returns:
         (how many there are now, whether any edge fell).
     """
-    falls = False
-    for k in range(edges.shape[0]):
-        e = edges[k]
-        u, old = graph.tail[e], graph.cost[e]
-        graph.cost[e] = costs[k]
-        falls = falls or costs[k] < old
-        if costs[k] > old and state.best[u] == graph.head[e] and u != state.ends[GOAL]:
-            state.best[u], branch[roots] = CUT, u
-            roots += 1
+    falls, marks, cost, stored = False, state.edge_marks, graph.cost, state.told
+    for begin in range(0, edges.shape[0], stored.shape[0]):
+        count = np.uint64(0)
+        for k in range(np.uint64(begin), np.uint64(min(begin + stored.shape[0], edges.shape[0]))):
+            e, new = np.uint32(edges[k]), costs[k]
+            old = cost[e]
+            cost[e] = new
+            falls = falls or new < old
+            word, shift = e >> np.uint32(4), np.uint32(2) * (e & np.uint32(15))
+            mark = marks[word]
+            stored[count] = np.int32(e)  # listed without a branch: whether an edge is stored nobody foresees
+            count += np.uint64((mark >> shift) & np.uint32(STORED) & np.uint32(new > old))
+            marks[word] = (mark & ~(np.uint32(CLOSED) << shift)) | (np.uint32(new == np.inf) << (shift + np.uint32(1)))
+        for k in range(count):
+            e = stored[k]
+            u = graph.tail[e]
+            if state.best[u] == graph.head[e] and u != state.ends[GOAL]:
+                state.best[u], branch[roots] = CUT, u
+                roots += 1
     return roots, falls
 
 
@@ -119,4 +129,5 @@ def _take_what_fell(graph: Digraph, bounds: Bounds, state: Lifelong, edges: Ints
         through = graph.cost[edges[k]] + state.g[v]
         if u != state.ends[GOAL] and through < state.rhs[u]:
             state.rhs[u], state.best[u] = through, v
+            set_mark(state, edges[k], STORED)
             update(bounds, state, u)
