@@ -19,10 +19,10 @@ sys.path[:0] = [str(ROOT / "tests"), str(ROOT / "tests" / "firmware")]
 
 from test_firmware_boards import steady  # noqa: E402
 from test_firmware_stretch import FAST, SEGMENT_TICKS, Player  # noqa: E402
-from test_firmware_uno import Streamer  # noqa: E402
 
 from firmware_board import LEAD_TICKS, Board, EmulatedFirmware, Schedule, end_motion  # noqa: E402 - the tests' board
 from firmware_motions import fast, restless  # noqa: E402
+from firmware_streamer import Streamer  # noqa: E402
 from planarm.stepping.segments import Coding, compress  # noqa: E402
 from planarm_wire.codec import encode  # noqa: E402
 from planarm_wire.framing import encode_frame  # noqa: E402
@@ -71,6 +71,8 @@ def main() -> None:
         streamed("random motion to 50,000 steps/s, window kept full", restless(1, 320, round(145 * seconds))),
         streamed("random motion to 71,111 steps/s, window kept full", restless(1, 225, round(145 * seconds))),
         four_saturated(seconds),
+        long_pulses(seconds, "saturated"),
+        long_pulses(seconds, "window kept full"),
     ]
     step, stack, interrupts = watched()
     rows += [interrupts, hold_latency(), emergency_latency(), ring()]
@@ -155,6 +157,27 @@ def four_saturated(seconds: float) -> tuple[str, str]:
     return f"four joints at 15,000 steps/s, {seconds:.1f} s, line saturated", f"{fault}{told}; {missing} missing"
 
 
+def long_pulses(seconds: float, line: str) -> tuple[str, str]:
+    """Both joints at the least interval of the image for slow drivers, both edges of every pulse by a match."""
+    slow = BOARDS["uno_slow"]
+    firmware = EmulatedFirmware(IMAGE.with_name("uno_slow.hex"), slow)
+    rate = round(TICKS_HZ / slow.min_interval_ticks)
+    name = f"slow drivers, {rate:,} : {rate / 1.0037:,.0f} steps/s, {line}"
+    if line == "saturated":
+        duration = 30_000 * slow.min_interval_ticks
+        motion = fast(slow.min_interval_ticks, 1.0037, duration, max(1, round(seconds * TICKS_HZ / duration)))
+        motion = end_motion(motion)
+        board = play_saturated(firmware, motion, duration)
+        status = board.ask()
+        told = deviation(board, motion) if status.fault is Fault.NONE else f"{status.fault.name}"
+        return (
+            f"{name}, {duration * len(motion) / TICKS_HZ:.1f} s",
+            f"{told}; {status.overruns} bytes lost in the USART",
+        )
+    count = max(20, round(seconds * TICKS_HZ / (4 * SLICE_TICKS)))
+    return streamed(name, fast(slow.min_interval_ticks, 1.0037, 4 * SLICE_TICKS, count), firmware)
+
+
 def play_saturated(firmware: EmulatedFirmware, motion: list, duration: int) -> Board:
     """Play a motion that the queue holds while valid frames fill the line without a gap."""
     board = Board(firmware)
@@ -173,11 +196,11 @@ def play_saturated(firmware: EmulatedFirmware, motion: list, duration: int) -> B
     return board
 
 
-def streamed(name: str, motion: list) -> tuple[str, str]:
+def streamed(name: str, motion: list, firmware: EmulatedFirmware | None = None) -> tuple[str, str]:
     """A motion streamed within the host's window of 112 bytes, which queries keep full."""
     motion = end_motion(motion)
     length_ticks = sum(map(duration_ticks, motion))
-    board = Board(EmulatedFirmware(IMAGE))
+    board = Board(firmware or EmulatedFirmware(IMAGE))
     board.get_ready()
     for segment in motion[:16]:
         board.ask(Segments(0, 0, 0, (segment,)))

@@ -37,11 +37,11 @@ class Tracer(EmulatedFirmware):
         self.chip.sreg &= ~INTERRUPTS_ON
         self.uno.run(cycles=ticks)
         # On to the main program's next pass: the end of a lock that is open now would switch off what it found off.
-        while not self._begins_pass():
+        while not self.begins_pass():
             self.chip.run_to(self.chip.cycle + 1)
         self.chip.sreg |= INTERRUPTS_ON
 
-    def _begins_pass(self) -> bool:
+    def begins_pass(self) -> bool:
         """True when the next instruction is WDR, with which a pass begins."""
         return self.uno.flash[2 * self.chip.pc : 2 * self.chip.pc + 2] == b"\xa8\x95"
 

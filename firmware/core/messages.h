@@ -13,7 +13,7 @@ namespace wire {
 // Both ends must have the same.
 constexpr uint8_t PROTOCOL_VERSION = 2;
 // Of the specification without its wording.
-constexpr uint32_t SPEC_HASH = 0xC5DF0400UL;
+constexpr uint32_t SPEC_HASH = 0x068F5E98UL;
 
 // Ends every frame.
 constexpr uint8_t DELIMITER = 0x7E;
@@ -82,10 +82,6 @@ constexpr uint16_t MAX_SEGMENT_STEPS = 32767U;
 constexpr uint16_t MIN_LEAD_TICKS = 56000U;
 // Path that the queue must hold beyond what a rest needs, 4.1 ms; with less the device slows down.
 constexpr uint32_t STARVING_TICKS = 65536UL;
-// Least high time of a step pulse, 3.5 us.
-constexpr uint8_t MIN_STEP_HIGH_TICKS = 56;
-// Least low time of a step pulse, 2.5 us.
-constexpr uint8_t MIN_STEP_LOW_TICKS = 40;
 // Least time from a DIR edge to the next rising STEP edge, 20 us.
 constexpr uint16_t MIN_DIR_SETUP_TICKS = 320U;
 
@@ -209,6 +205,8 @@ enum class Reset : uint8_t {
 enum class PinMap : uint8_t {
     // Own wiring: STEP on the compare outputs D9 and D10.
     OWN = 0,
+    // Own wiring as well, for drivers that need longer pulses.
+    OWN_SLOW = 2,
     // The Arduino CNC shield as it is: STEP on D2 and D3, by interrupt.
     CNC_SHIELD = 1,
 };

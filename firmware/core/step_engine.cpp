@@ -113,7 +113,8 @@ bool start_when_due() {
 template <uint8_t JOINT>
 void finish_pulse() {
     if (!hal::step_is_high<JOINT>()) return;
-    hal::set_steps_left<JOINT>(static_cast<uint8_t>(hal::steps_left<JOINT>() - 1));
+    if (!hal::step_is_counted<JOINT>())
+        hal::set_steps_left<JOINT>(static_cast<uint8_t>(hal::steps_left<JOINT>() - 1));
     hal::step_fall<JOINT>();
 }
 

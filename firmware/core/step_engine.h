@@ -46,10 +46,8 @@ namespace step_engine {
 // Most steps of one run.
 constexpr uint8_t MAX_RUN_STEPS = 255;
 
-// Distance that an edge must still have when the interrupt looks at the timer, LOOK_AFTER_FALL_TICKS after
-// the fall: the low time, which also covers the way to the compare register.
-constexpr uint16_t LOOK_AFTER_FALL_TICKS = 2;
-constexpr uint16_t STEP_MARGIN_TICKS = wire::MIN_STEP_LOW_TICKS - LOOK_AFTER_FALL_TICKS;
+// Distance that an edge must still have when the interrupt looks at the timer.
+constexpr uint16_t STEP_MARGIN_TICKS = hal::STEP_MARGIN_TICKS;
 // The same after a change of DIR.
 constexpr uint16_t DIR_MARGIN_TICKS = wire::MIN_DIR_SETUP_TICKS;
 

@@ -138,13 +138,11 @@ def _schedules(train: StepTrain) -> list[Schedule]:
 
 
 def _drivers(named: str | None, plan: StoredPlan | None, joints: int) -> tuple[DriverRow | None, ...]:
-    names = [named] * joints
+    if named is not None and named not in DRIVERS:
+        raise CaptureError(f"no driver {named!r} is known; there are {', '.join(sorted(DRIVERS))}")
     if named is None and plan is not None:
-        names = [joint.driver for joint in scene_from_mapping(plan.scene).joints]
-    for name in names:
-        if name is not None and name not in DRIVERS:
-            raise CaptureError(f"no driver {name!r} is known; there are {', '.join(sorted(DRIVERS))}")
-    return tuple(DRIVERS[name] if name is not None else None for name in names)
+        return tuple(joint.driver_row for joint in scene_from_mapping(plan.scene).joints)
+    return (DRIVERS[named] if named is not None else None,) * joints
 
 
 def _limits(driver: DriverRow | None) -> PulseLimits:

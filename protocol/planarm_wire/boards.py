@@ -19,6 +19,10 @@ class Board:
     """What the firmware holds of queued segments."""
     min_interval_ticks: int
     """Least time between two steps of one joint."""
+    min_step_high_ticks: int
+    """Least high time of a step pulse."""
+    min_step_low_ticks: int
+    """Least low time between two of them."""
     step_pins: tuple[str, ...]
     """One a joint; the step is the rising edge."""
     dir_pins: tuple[str, ...]

@@ -8,7 +8,7 @@ through code and pages that quote them, named per row in `source`; where two dis
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 __all__ = ["DRIVERS", "RULES", "DriverRow"]
 
@@ -58,6 +58,14 @@ class DriverRow:
         """The least time of a rule of RULES, in seconds."""
         value: float | None = getattr(self, f"{rule}_s")
         return value
+
+    def with_pulses(self, high_s: float | None, low_s: float | None) -> DriverRow:
+        """The same driver on a board that needs other pulses; None keeps what the row says."""
+        return replace(
+            self,
+            step_high_s=self.step_high_s if high_s is None else high_s,
+            step_low_s=self.step_low_s if low_s is None else low_s,
+        )
 
 
 def _levels(*bits: str) -> list[tuple[int, ...]]:

@@ -14,7 +14,7 @@ from planarm_wire.layout import EACH_JOINT, END, Field
 
 PROTOCOL_VERSION: Final = 2
 """Both ends must have the same."""
-SPEC_HASH: Final = 0xC5DF0400
+SPEC_HASH: Final = 0x068F5E98
 """Hash of the specification without its wording."""
 DELIMITER: Final = 0x7E
 """Ends every frame."""
@@ -90,9 +90,9 @@ MIN_LEAD_TICKS: Final = 56_000
 STARVING_TICKS: Final = 65_536
 """Path that the queue must hold beyond what a rest needs, 4.1 ms; with less the device slows down."""
 MIN_STEP_HIGH_TICKS: Final = 56
-"""Least high time of a step pulse, 3.5 us."""
+"""Of the board uno: least high time of a step pulse, 3.5 us."""
 MIN_STEP_LOW_TICKS: Final = 40
-"""Least low time of a step pulse, 2.5 us."""
+"""Of the board uno: least low time of a step pulse, 2.5 us."""
 MIN_DIR_SETUP_TICKS: Final = 320
 """Least time from a DIR edge to the next rising STEP edge, 20 us."""
 STEP_PINS: Final = ("D9", "D10")
@@ -109,6 +109,8 @@ BOARDS: Final[dict[str, Board]] = {
         joints=2,
         queue_bytes=848,
         min_interval_ticks=225,
+        min_step_high_ticks=56,
+        min_step_low_ticks=40,
         step_pins=("D9", "D10"),
         dir_pins=("D4", "D5"),
         enable_pin="D8",
@@ -122,11 +124,28 @@ BOARDS: Final[dict[str, Board]] = {
         joints=4,
         queue_bytes=512,
         min_interval_ticks=1_000,
+        min_step_high_ticks=56,
+        min_step_low_ticks=40,
         step_pins=("D9", "D10", "D6", "D7"),
         dir_pins=("D4", "D5", "D2", "D3"),
         enable_pin="D8",
         stop_pin="A0",
         limit_pins=("A1", "A2", "A3", "A4"),
+    ),
+    "uno_slow": Board(
+        name="uno_slow",
+        doc="Own wiring, two joints, long pulses: Timer1's compare outputs make both edges of every step",
+        pin_map="own_slow",
+        joints=2,
+        queue_bytes=848,
+        min_interval_ticks=450,
+        min_step_high_ticks=240,
+        min_step_low_ticks=200,
+        step_pins=("D9", "D10"),
+        dir_pins=("D4", "D5"),
+        enable_pin="D8",
+        stop_pin="A0",
+        limit_pins=("A1", "A2"),
     ),
     "cnc_shield": Board(
         name="cnc_shield",
@@ -135,6 +154,8 @@ BOARDS: Final[dict[str, Board]] = {
         joints=2,
         queue_bytes=848,
         min_interval_ticks=320,
+        min_step_high_ticks=56,
+        min_step_low_ticks=40,
         step_pins=("D2", "D3"),
         dir_pins=("D5", "D6"),
         enable_pin="D8",
@@ -148,6 +169,8 @@ BOARDS: Final[dict[str, Board]] = {
         joints=4,
         queue_bytes=512,
         min_interval_ticks=1_280,
+        min_step_high_ticks=56,
+        min_step_low_ticks=40,
         step_pins=("D2", "D3", "D4", "D12"),
         dir_pins=("D5", "D6", "D7", "D13"),
         enable_pin="D8",
@@ -306,6 +329,8 @@ class PinMap(IntEnum):
 
     OWN = 0
     """Own wiring: STEP on the compare outputs D9 and D10."""
+    OWN_SLOW = 2
+    """Own wiring as well, for drivers that need longer pulses."""
     CNC_SHIELD = 1
     """The Arduino CNC shield as it is: STEP on D2 and D3, by interrupt."""
 

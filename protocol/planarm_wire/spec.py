@@ -290,7 +290,7 @@ def _limits(value: object) -> tuple[Limit, ...]:
 def _boards(value: object, limits: Mapping[str, int], pin_maps: tuple[str, ...]) -> tuple[Board, ...]:
     if not isinstance(value, dict) or not value:
         raise SpecError("boards: not a table with at least one board")
-    numbers = ("joints", "queue_bytes", "min_interval_ticks")
+    numbers = ("joints", "queue_bytes", "min_interval_ticks", "min_step_high_ticks", "min_step_low_ticks")
     lists = ("step_pins", "dir_pins", "limit_pins")
     words = ("doc", "pin_map", "enable_pin", "stop_pin")
     needed = {**dict.fromkeys(numbers, int), **dict.fromkeys(lists, list), **dict.fromkeys(words, str)}

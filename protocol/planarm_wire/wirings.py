@@ -23,3 +23,8 @@ def board_of(joints: int, pin_map: str = OWN) -> Board:
         most = max(board.joints for board in wired)
         raise WireError(f"an arm with {joints} joints; the wiring {pin_map} has pins for {most}")
     return min(fitting, key=lambda board: board.joints)
+
+
+def boards_alike(board: Board) -> tuple[Board, ...]:
+    """Return the board and then the others with the same pins, which differ in the pulses that they make."""
+    return (board, *(one for one in BOARDS.values() if one != board and one.driver_pins == board.driver_pins))

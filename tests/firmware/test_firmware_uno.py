@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections import deque
 from collections.abc import Callable
 from pathlib import Path
 
@@ -15,13 +14,13 @@ from firmware_board import (
     EmulatedFirmware,
     Schedule,
     end_motion,
-    room_after,
     run_of,
     segment_of,
 )
 from firmware_motions import fast, restless
+from firmware_streamer import LedgerReader, Streamer
 from planarm_sim import Uno
-from planarm_wire.codec import decode, encode, encoded_bytes
+from planarm_wire.codec import decode, encode
 from planarm_wire.framing import Frame, FrameDecoder, encode_frame
 from planarm_wire.messages import (
     BAUD,
@@ -33,12 +32,10 @@ from planarm_wire.messages import (
     MIN_STEP_HIGH_TICKS,
     MIN_STEP_LOW_TICKS,
     PROTOCOL_VERSION,
-    QUEUE_FRAME_BYTES,
     STEP_PINS,
     TICKS_HZ,
     Fault,
     Hello,
-    Query,
     Segment,
     Segments,
     Start,
@@ -114,58 +111,6 @@ def test_reset_in_motion_releases_the_drivers_and_forgets_the_motion(emulated_fi
     board.hello()
     status = board.ask()
     assert (status.state, status.ledger.position_usteps) == (State.IDLE, (0, 0))
-
-
-class Streamer:
-    """Sends a motion as a host does: a window of unacknowledged bytes, the line never idle while it has room."""
-
-    def __init__(self, board: Board, segments: list[Segment], busy_line: bool) -> None:
-        self.board = board
-        self.waiting = deque(segments)
-        self.busy_line = busy_line
-        self.in_flight: deque[tuple[int, int, int]] = deque()
-        self.last: Status | None = None
-        board.replies.clear()
-
-    def run(self, until_segments: int, limit_ticks: int) -> Status:
-        """Stream until so many segments are executed or a fault is latched."""
-        end = self.board.now + limit_ticks
-        while self.board.now < end:
-            self.top_up()
-            self.board.run(2000)
-            while self.board.replies:
-                self.take_reply(*self.board.replies.popleft())
-            if self.last and (
-                self.last.fault is not Fault.NONE or self.last.ledger.executed_segments >= until_segments
-            ):
-                return self.last
-        raise AssertionError(f"not done after {limit_ticks} ticks: {self.last}")
-
-    def take_reply(self, acknowledged: int, reply: object) -> None:
-        assert isinstance(reply, Status)
-        self.last = reply
-        while self.in_flight and (acknowledged - self.in_flight[0][0] - 1) % 256 < 128:
-            self.in_flight.popleft()
-
-    def top_up(self) -> None:
-        free = room_after() if self.last is None else self.last.free_bytes
-        queued = sum(room for _, _, room in self.in_flight)
-        while True:
-            next_message = Segments(0, 0, 0, (self.waiting[0],)) if self.waiting else None
-            has_room = next_message is not None and queued + encoded_bytes(next_message) <= free
-            if not has_room and not self.busy_line and self.in_flight:
-                return
-            message = next_message if has_room and next_message is not None else Query()
-            frame = encode_frame(self.board.seq, *encode(message))
-            if sum(size for _, size, _ in self.in_flight) + len(frame) > HOST_WINDOW_BYTES:
-                return
-            room = encoded_bytes(message) + QUEUE_FRAME_BYTES if has_room else 0
-            self.in_flight.append((self.board.seq, len(frame), room))
-            self.board.seq = (self.board.seq + 1) % 256
-            self.board.receive(frame)
-            if has_room:
-                self.waiting.popleft()
-                queued += room
 
 
 def reversing(ratio: float) -> list[Segment]:
@@ -283,19 +228,6 @@ def test_constant_rates_on_a_saturated_line(
     assert_every_edge(board, motion, status)
 
 
-class LedgerReader(Streamer):
-    """Keeps what the ledger told, and for when."""
-
-    def __init__(self, board: Board, segments: list[Segment]) -> None:
-        super().__init__(board, segments, busy_line=True)
-        self.told: list[tuple[int, tuple[int, ...]]] = []
-
-    def take_reply(self, acknowledged: int, reply: object) -> None:
-        super().take_reply(acknowledged, reply)
-        assert isinstance(reply, Status)
-        self.told.append((reply.mcu_ticks, reply.ledger.position_usteps))
-
-
 def test_the_ledger_is_exact_at_its_tick_between_the_steps(emulated_firmware: EmulatedFirmware) -> None:
     # Both joints at the board's rate in all phases, a pulse or an interrupt at nearly every moment. What the ledger
     # tells must be the steps that have risen at its tick; the tick of cycle 0 is the same for all.
@@ -307,16 +239,7 @@ def test_the_ledger_is_exact_at_its_tick_between_the_steps(emulated_firmware: Em
     board.ask(Start(LEAD_TICKS))
     reader = LedgerReader(board, motion[12:])
     reader.run(len(motion), 12_000_000)
-    moving = [(tick, told) for tick, told in reader.told if 0 < told[0] < len(board.rises(0))]
-    assert len(moving) >= 60
-    fitting: set[int] | None = None
-    for tick, told in moving:
-        risen = [board.rises(joint) for joint in range(2)]
-        earliest = max(rises[count - 1] for rises, count in zip(risen, told, strict=True))
-        latest = min(rises[count] for rises, count in zip(risen, told, strict=True))
-        zeros = set(range(earliest - tick, latest - tick))
-        fitting = zeros if fitting is None else fitting & zeros
-    assert fitting, "no tick of cycle 0 explains all ledgers"
+    reader.assert_exact()
 
 
 def test_more_bytes_than_the_ring_holds_are_counted_and_harmless(emulated_firmware: EmulatedFirmware) -> None:

@@ -174,7 +174,7 @@ def test_an_entry_into_the_common_prologue_that_saves_a_kept_register_is_refused
         builder.require_free_registers(Path("any.elf"), flags)
 
 
-LOCK_CYCLES = {"uno": 13, "uno_four": 27}
+LOCK_CYCLES = {"uno": 13, "uno_four": 27, "uno_slow": 17}
 # Around the start of a joint at rest, what rests, and what ends a motion; but in the last the other joint may step.
 LONG_LOCK_CYCLES = {"serve": 50, "freeze": 80, "end_steps": 34}
 
@@ -204,7 +204,7 @@ def locked_cycles(listing: str) -> dict[str, int]:
 
 
 @needs_avr_gcc
-@pytest.mark.parametrize("board", ["uno", "uno_four"])
+@pytest.mark.parametrize("board", LOCK_CYCLES)
 def test_locks_that_are_met_while_joints_step_are_short(tmp_path: Path, board: str) -> None:
     # firmware/README.md, budgets: 11 cycles and 2.
     build("avr", tmp_path)

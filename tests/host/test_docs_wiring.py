@@ -29,6 +29,7 @@ SLOTS = ("slot X", "slot Y", "slot Z", "slot A")
     ("name", "board", "slots"),
     [
         ("own", "uno", DRIVERS[:2]),
+        ("own", "uno_slow", DRIVERS[:2]),
         ("own_four", "uno_four", DRIVERS),
         ("cnc_shield_wires", "uno", ("slot Y", "slot X")),
         ("cnc_shield", "cnc_shield", SLOTS[:2]),

@@ -3,21 +3,25 @@
 from dataclasses import replace
 from itertools import pairwise
 from math import radians
+from pathlib import Path
 
 import numpy as np
 import pytest
 import shapely
 
 from board_scenes import GOAL, LENGTHS, scene_of
-from planarm.errors import LinkError, TimingError
+from planarm.errors import LinkError, SceneError, StepsDifferError, TimingError
+from planarm.link import sim_bench
 from planarm.link.exchange import open_session
 from planarm.link.released_image import released_image
 from planarm.link.sim_transport import SimTransport
 from planarm.pipeline import plan_scene, run_scene
 from planarm.plan_file import load_plan
+from planarm.scene import parse_scene
 from planarm_wire.messages import BOARDS, MIN_DIR_SETUP_TICKS, TICKS_HZ
 from planarm_wire.steps import duration_ticks
 
+EXAMPLE = Path(__file__).parents[2] / "examples" / "slow_drivers.toml"
 CASES = [(joints, wiring) for wiring in ("own", "cnc_shield") for joints in (1, 2, 3, 4)]
 MOST_OFF_TICKS = {"uno": 0, "uno_four": 192, "cnc_shield": 160, "cnc_shield_four": 480}
 """docs/wiring.md's table: how far a step may rise from its tick."""
@@ -116,6 +120,62 @@ STRONG = replace(scene_of(1).joints[0].motor, holding_torque_nm=50.0, inductance
 def test_a_plan_for_another_board_is_refused_before_anything_moves(image, words, tmp_path):
     with pytest.raises(LinkError, match=words):
         run_scene(scene_of(3), f"sim://?image={released_image(image)}", tmp_path, no_notice)
+
+
+def slow_scene(high_us=10.0, low_us=10.0):
+    """Two links whose drivers need pulses so long."""
+    text = EXAMPLE.read_text(encoding="utf-8")
+    text = text.replace("step_high_us = 10", f"step_high_us = {high_us}").replace("low_us = 10", f"low_us = {low_us}")
+    return parse_scene(text, str(EXAMPLE))
+
+
+@pytest.mark.parametrize(("high_us", "low_us"), [(5.0, 5.0), (10.0, 10.0), (15.0, 12.5)])
+def test_drivers_that_need_long_pulses_lose_no_step(high_us, low_us, tmp_path):
+    scene = slow_scene(high_us, low_us)
+    assert scene.board.name == "uno_slow"
+    summary = run_scene(scene, "sim://", tmp_path, no_notice)
+    assert summary["certificate_ok"] and summary["arm_clean"]
+    assert summary["steps_at_pins"] == summary["steps_planned"]
+    assert summary["net_usteps"] == summary["net_usteps_by_ledger"]
+    assert summary["arm_lost_full_steps"] == [0, 0]
+    assert summary["max_step_timing_error_ticks"] == 0
+    assert summary["min_pulse_high_us"] == 15.0
+    assert summary["min_pulse_low_us"] >= 13.0
+
+
+def test_the_same_drivers_lose_steps_by_shorter_pulses(tmp_path, monkeypatch):
+    slow = slow_scene()
+    brisk = replace(
+        slow, wiring="own", joints=tuple(replace(j, step_high_s=None, step_low_s=None) for j in slow.joints)
+    )
+    assert brisk.board.name == "uno"
+    monkeypatch.setattr(sim_bench, "drivers_of", lambda _scene, made=sim_bench.drivers_of: made(slow))
+    with pytest.raises(
+        StepsDifferError, match=r"joint 1 lost \d+ full steps; joint 2 lost \d+ full steps; .*step_high"
+    ):
+        run_scene(brisk, "sim://", tmp_path, no_notice)
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"high_us": 20.0}, r"joints\[1\].step_high_us: .* high for 20 us, the board uno makes them high for 3.5 us"),
+        ({"low_us": 300.0}, r"joints\[1\].step_low_us: .* low for 300 us, .* or lower max_speed_deg_s"),
+    ],
+)
+def test_drivers_that_no_board_serves_are_refused(changes, words):
+    with pytest.raises(SceneError, match=words):
+        _ = slow_scene(**changes).board
+
+
+def test_slow_drivers_of_four_joints_and_of_the_shield_are_refused():
+    joint = slow_scene().joints[0]
+    for scene in (scene_of(3), scene_of(2, "cnc_shield"), scene_of(4, "cnc_shield")):
+        slow = replace(scene, joints=(joint, *scene.joints[1:]))
+        with pytest.raises(
+            SceneError, match=rf"the board {scene.board.name} makes them high for 3.5 us; the longest are"
+        ):
+            _ = slow.board
 
 
 def test_every_board_tells_its_joints():

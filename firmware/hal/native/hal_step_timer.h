@@ -117,6 +117,14 @@ bool step_is_high() {
     return board::is_high(JOINT);
 }
 
+// As on the Uno, where the interrupt makes the fall.
+constexpr uint16_t STEP_MARGIN_TICKS = planarm::wire::MIN_STEP_LOW_TICKS - 2;
+
+template <uint8_t JOINT>
+bool step_is_counted() {
+    return false;
+}
+
 inline uint8_t step_levels() {
     uint8_t levels = 0;
     for (uint8_t joint = 0; joint < planarm::wire::JOINTS; ++joint) {

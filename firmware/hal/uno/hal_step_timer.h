@@ -5,6 +5,8 @@
 // COMPARE    joints 0 and 1 on OC1A and OC1B (D9, D10). A channel's compare output is in one of two modes.
 //            Armed: the pin toggles at the match, so it rises, and a forced compare takes it low again.
 //            Disarmed: the pin falls at the match, so a match means nothing to a low pin.
+//            Where drivers need long pulses (SECOND_MATCH) an armed pin falls at a second match, and the
+//            interrupt of the first only sets its tick: second_match.h.
 // MATCH      joints 0 and 1 on any pins: the interrupt of the same match makes the pulse, whole.
 // SCHEDULED  joints 2 and 3: Timer2's interrupt makes the pulse, whole, when Timer1 says so: scheduled.cpp.
 //
@@ -32,6 +34,19 @@ constexpr Output output() {
            : planarm::wire::STEP_PINS[JOINT] == (JOINT == 0 ? 9 : 10) ? Output::COMPARE
                                                                       : Output::MATCH;
 }
+
+// Whether pulses are so long that a second match ends them.
+constexpr bool SECOND_MATCH = planarm::wire::MIN_STEP_HIGH_TICKS > 56;
+static_assert(!SECOND_MATCH || (output<0>() == Output::COMPARE && planarm::wire::JOINTS == 2),
+              "only compare outputs end pulses by themselves");
+
+// Distance that an edge must still have when the interrupt that places it looks at the timer: the low time,
+// less 2 between the fall and the look. With a second match the low time is what the intervals leave: no more
+// than the way to the compare register, which leads past TCCR1A when a joint is started.
+constexpr uint16_t STEP_MARGIN_TICKS = SECOND_MATCH ? 14 : planarm::wire::MIN_STEP_LOW_TICKS - 2;
+static_assert(!SECOND_MATCH || planarm::wire::MIN_INTERVAL_TICKS - planarm::wire::MIN_STEP_HIGH_TICKS >=
+                                   planarm::wire::MIN_STEP_LOW_TICKS,
+              "the low time");
 
 // COM bits with both channels disarmed; on other pins the compare outputs are left alone.
 constexpr uint8_t ALL_DISARMED = output<0>() == Output::COMPARE ? _BV(COM1A1) | _BV(COM1B1) : 0;
@@ -178,8 +193,23 @@ HAL_INLINE bool step_is_high() {
     return output<JOINT>() == Output::COMPARE && read_pin(planarm::wire::STEP_PINS[JOINT]);
 }
 
-// All step pins that the compare outputs drive, in one instruction; step_level tells a joint's.
-HAL_INLINE uint8_t step_levels() { return ALL_DISARMED != 0 ? PINB : 0; }
+// All step pins that the compare outputs drive, in one instruction; step_level tells a joint's. With a second
+// match only those whose rise is not counted yet: OC1A and OC1B are the bits of PINB that OCF1A and OCF1B are
+// of TIFR1. The flags are read first: a pulse that falls in between is counted.
+HAL_INLINE uint8_t step_levels() {
+    if (SECOND_MATCH) {
+        const uint8_t matched = TIFR1;
+        __asm__ __volatile__("nop");  // the pin is read a cycle later than it changes
+        return matched & PINB;
+    }
+    return ALL_DISARMED != 0 ? PINB : 0;
+}
+
+// Whether a pulse that main sees high is counted already.
+template <uint8_t JOINT>
+HAL_INLINE bool step_is_counted() {
+    return SECOND_MATCH && (TIFR1 & (JOINT == 0 ? _BV(OCF1A) : _BV(OCF1B))) == 0;
+}
 
 template <uint8_t JOINT>
 HAL_INLINE bool step_level(uint8_t levels) {
@@ -256,10 +286,20 @@ HAL_INLINE uint16_t end_steps() {
     return static_cast<uint16_t>(counter + END_TICKS);
 }
 
-// Passes the least high time of a pulse that may have risen just now: 19 turns of 3 cycles.
+// Passes the least high time of a pulse that may have risen just now, in turns of 3 cycles.
 inline void wait_step_high() {
-    uint8_t turns = 19;
+    uint8_t turns = planarm::wire::MIN_STEP_HIGH_TICKS / 3 + 1;
     __asm__ __volatile__("1: dec %0\n\tbrne 1b" : "+r"(turns));
+}
+
+// Lets pulses that are high fall while nothing is armed, by themselves: at once, or with a second match after
+// their least high time.
+HAL_INLINE void fall_soon() {
+    if (SECOND_MATCH) {
+        OCR1A = OCR1B = static_cast<uint16_t>(TCNT1 + planarm::wire::MIN_STEP_HIGH_TICKS);
+    } else {
+        TCCR1C = _BV(FOC1A) | _BV(FOC1B);
+    }
 }
 
 template <uint8_t JOINT>

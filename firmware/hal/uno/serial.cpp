@@ -96,12 +96,18 @@ void emergency_clear() { emergencies_cleared = emergencies_told; }
 
 }  // namespace hal
 
+static_assert(_SFR_MEM_ADDR(TCCR1C) == _SFR_MEM_ADDR(TCCR1A) + 2, "%[tccra] + 2");
+static_assert(_SFR_MEM_ADDR(TCNT1) == _SFR_MEM_ADDR(TCCR1A) + 4, "%[tccra] + 4");
+static_assert(_SFR_MEM_ADDR(OCR1A) == _SFR_MEM_ADDR(TCCR1A) + 8, "%[tccra] + 8");
+static_assert(_SFR_MEM_ADDR(OCR1B) == _SFR_MEM_ADDR(TCCR1A) + 10, "%[tccra] + 10");
+
 // The interrupts, in assembler with registers that no other code uses: see step_interrupts.cpp.
 
 // Cycles with entry and jump: 40 for a byte stored or one that finds no room, 44 after an overrun, 37 for a
 // hold, 42 for an emergency byte that is not the last. A byte comes every 640
 // at the fastest. Bytes lost before a hold or an emergency byte are not counted. After the last emergency
-// byte both pins are low 44 cycles after the interrupt's beginning.
+// byte both pins are low 44 cycles after the interrupt's beginning; with a second match MIN_STEP_HIGH_TICKS
+// later.
 ISR(USART_RX_vect, ISR_NAKED) {
     __asm__ __volatile__(
         R"(
@@ -168,8 +174,19 @@ ISR(USART_RX_vect, ISR_NAKED) {
 
     7:  ldi  r30, %[all_disarmed]       ; end all pulses
         sts  %[tccra], r30
+        .if %[second_match]
+        lds  r30, %[tccra] + 4          ; they fall after the least high time
+        lds  r31, %[tccra] + 5
+        subi r30, lo8(-(%[high]))
+        sbci r31, hi8(-(%[high]))
+        sts  %[tccra] + 9, r31
+        sts  %[tccra] + 8, r30
+        sts  %[tccra] + 11, r31
+        sts  %[tccra] + 10, r30
+        .else
         ldi  r30, %[all_forced]
-        sts  %[tccrc], r30
+        sts  %[tccra] + 2, r30
+        .endif
         ldi  r30, %[only_laps]
         sts  %[timsk], r30
         .if %[joints] > 2
@@ -191,18 +208,19 @@ ISR(USART_RX_vect, ISR_NAKED) {
         [run] "I"(_SFR_IO_ADDR(EMERGENCY_RUN)), [ring] "i"(hal::ring), [size] "i"(hal::RX_RING_BYTES),
         [full] "i"(&hal::ring_full), [overruns] "I"(_SFR_IO_ADDR(OVERRUNS)), [holds] "i"(&hal::holds),
         [repeats] "M"(planarm::wire::EMERGENCY_REPEATS), [all_disarmed] "i"(hal::ALL_DISARMED),
-        [all_forced] "M"(_BV(FOC1A) | _BV(FOC1B)), [tccra] "i"(&TCCR1A), [tccrc] "i"(&TCCR1C),
-        [timsk] "i"(&TIMSK1), [only_laps] "M"(hal::ONLY_LAPS),
-        [line] "M"(static_cast<uint8_t>(hal::Emergency::LINE)), [emergencies] "i"(&hal::emergencies),
-        [cause] "i"(&hal::emergency_cause), [joints] "n"(planarm::wire::JOINTS),
-        [scheduled_on] "i"(&hal::scheduled_on), [timsk2] "i"(&TIMSK2));
+        [all_forced] "M"(_BV(FOC1A) | _BV(FOC1B)), [tccra] "i"(&TCCR1A),
+        [second_match] "n"(hal::SECOND_MATCH ? 1 : 0),
+        [high] "n"(static_cast<uint16_t>(planarm::wire::MIN_STEP_HIGH_TICKS)), [timsk] "i"(&TIMSK1),
+        [only_laps] "M"(hal::ONLY_LAPS), [line] "M"(static_cast<uint8_t>(hal::Emergency::LINE)),
+        [emergencies] "i"(&hal::emergencies), [cause] "i"(&hal::emergency_cause),
+        [joints] "n"(planarm::wire::JOINTS), [scheduled_on] "i"(&hal::scheduled_on), [timsk2] "i"(&TIMSK2));
 }
 
 // The stop input's contact opened: what the last emergency byte does.
 ISR(PCINT1_vect) {
     if (!hal::read_pin(planarm::wire::STOP_PIN)) return;
     hal::steps_off();
-    TCCR1C = _BV(FOC1A) | _BV(FOC1B);
+    hal::fall_soon();
     hal::emergencies = static_cast<uint8_t>(hal::emergencies + 1);
     hal::emergency_cause = hal::Emergency::INPUT;
 }

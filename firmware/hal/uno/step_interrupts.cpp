@@ -55,6 +55,12 @@ static_assert(hal::output<0>() != hal::Output::COMPARE ||
 // The first of the joint's two registers for the fraction; the assembler takes registers by number.
 constexpr uint8_t fraction_register(uint8_t joint) { return joint == 0 ? 12 : 14; }
 
+}  // namespace
+
+#include "second_match.h"
+
+namespace {
+
 template <uint8_t JOINT>
 HAL_INLINE void step_interrupt() {
     __asm__ __volatile__(
@@ -268,6 +274,18 @@ ISR(TIMER1_OVF_vect, ISR_NAKED) {
         [laps] "i"(&hal::timer_laps));
 }
 
-ISR(TIMER1_COMPA_vect, ISR_NAKED) { step_interrupt<0>(); }
+ISR(TIMER1_COMPA_vect, ISR_NAKED) {
+    if (hal::SECOND_MATCH) {
+        second_match_interrupt<0>();
+    } else {
+        step_interrupt<0>();
+    }
+}
 
-ISR(TIMER1_COMPB_vect, ISR_NAKED) { step_interrupt<1>(); }
+ISR(TIMER1_COMPB_vect, ISR_NAKED) {
+    if (hal::SECOND_MATCH) {
+        second_match_interrupt<1>();
+    } else {
+        step_interrupt<1>();
+    }
+}

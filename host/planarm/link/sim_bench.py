@@ -160,11 +160,11 @@ def rig_of(scene: Scene, start_usteps: tuple[int, ...]) -> Rig:
 
 def drivers_of(scene: Scene) -> list[DriverWiring]:
     """Return the scene's drivers on the pins of its board."""
-    from planarm_sim import DriverWiring, driver_row  # noqa: PLC0415
+    from planarm_sim import DriverWiring  # noqa: PLC0415
 
     board = scene.board
     return [
-        DriverWiring(driver_row(joint.driver), step, direction, board.enable_pin, microsteps=joint.microsteps)
+        DriverWiring(joint.driver_row, step, direction, board.enable_pin, microsteps=joint.microsteps)
         for joint, (step, direction) in zip(scene.joints, board.joint_pins, strict=False)
     ]
 

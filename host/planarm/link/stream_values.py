@@ -111,7 +111,8 @@ class Phase(Enum):
 def config_of(start_stop_ticks: Sequence[int], board: Board) -> Config:
     """Return what a board is told of its wiring and the motors' start-stop intervals; further joints rest."""
     told = (*start_stop_ticks, *(DEFAULT_START_STOP_TICKS,) * (board.joints - len(start_stop_ticks)))
-    return Config(PinMap[board.pin_map.upper()], board.joints, 0, 0, 0, DEFAULT_WAKE_TICKS, 0, told)
+    pulses_ticks = board.min_step_high_ticks
+    return Config(PinMap[board.pin_map.upper()], board.joints, 0, 0, 0, DEFAULT_WAKE_TICKS, pulses_ticks, told)
 
 
 def position_of(usteps: Sequence[int], joints: int) -> SetPosition:

@@ -5,6 +5,7 @@ centimetres and radians. docs/scene.md is the reference of the format.
 """
 
 from planarm.scene.dc_motors import DcMotorSpec
+from planarm.scene.joint import JointSpec
 from planarm.scene.joint_space import ElbowChoice, JointObjective, JointSpaceSpec
 from planarm.scene.limit_switches import LimitSwitchSpec
 from planarm.scene.load import load_scene, parse_scene, with_planner, with_space
@@ -19,7 +20,6 @@ from planarm.scene.types import (
     ArmSpec,
     Corners,
     Elbow,
-    JointSpec,
     LinkSpec,
     MotionSpec,
     Moves,

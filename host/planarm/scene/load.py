@@ -8,6 +8,7 @@ from pathlib import Path
 from planarm.errors import SceneError
 from planarm.scene.board import BOARD_KEYS, parse_board
 from planarm.scene.dc_motors import DC_MOTOR_KEYS, parse_dc_motors
+from planarm.scene.joint import JointSpec
 from planarm.scene.joint_space import JOINT_SPACE_KEYS, JointSpaceSpec, read_joint_space
 from planarm.scene.limit_switches import parse_limit_switches
 from planarm.scene.mechanics import MECHANICS_KEYS, TRANSMISSION_KEYS, parse_coupling, parse_mechanics
@@ -24,7 +25,6 @@ from planarm.scene.types import (
     Algorithm,
     ArmSpec,
     Elbow,
-    JointSpec,
     LinkSpec,
     Moves,
     Objective,
@@ -65,6 +65,8 @@ JOINT_KEYS = (
     "microsteps",
     "gear_ratio",
     "driver",
+    "step_high_us",
+    "step_low_us",
     "max_speed_deg_s",
     "max_acceleration_deg_s2",
     "max_jerk_deg_s3",
@@ -156,6 +158,8 @@ def scene_from_toml(data: dict[str, object], source: str) -> Scene:
         planner.on_roadmap,
     )
     moving = read_moving(root, planner.on_roadmap)
+    joints = _joints(root, links)
+    coupling = parse_coupling(root.table("transmission", TRANSMISSION_KEYS, optional=True), links)
     return Scene(
         name=root.text("name", Path(source).stem or source),
         source=source,
@@ -164,10 +168,10 @@ def scene_from_toml(data: dict[str, object], source: str) -> Scene:
         obstacles=tuple(parse_obstacle(source, path, entry, moving) for path, entry in root.tables("obstacles")),
         task=parse_task(root.table("task", TASK_KEYS), limits),
         planner=planner,
-        joints=_joints(root, links),
+        joints=joints,
         link=_link(root.table("link", LINK_KEYS, optional=True)),
         mechanics=parse_mechanics(root.table("mechanics", MECHANICS_KEYS, optional=True), arm.link_lengths_cm),
-        coupling=parse_coupling(root.table("transmission", TRANSMISSION_KEYS, optional=True), links),
+        coupling=coupling,
         joint_space=read_joint_space(root.table("joint_space", JOINT_SPACE_KEYS), arm.elbow)
         if "joint_space" in data
         else None,
@@ -176,7 +180,7 @@ def scene_from_toml(data: dict[str, object], source: str) -> Scene:
         roadmap=parse_roadmap(root.table("roadmap", ROADMAP_KEYS, optional=True)),
         dc_motors=parse_dc_motors(root.table("dc_motors", DC_MOTOR_KEYS, optional=True), links),
         moving=moving,
-        wiring=parse_board(root.table("board", BOARD_KEYS, optional=True)),
+        wiring=parse_board(root.table("board", BOARD_KEYS, optional=True), joints, coupling),
     )
 
 
@@ -336,7 +340,14 @@ def _joint(table: Table) -> JointSpec:
         zero_offset_rad=radians(table.number("zero_offset_deg", 0.0, at_least=-720.0, at_most=720.0)),
         motor=parse_motor(table.table("motor", MOTOR_KEYS, optional=True)),
         max_jerk_rad_s3=radians(jerk) if jerk > 0.0 else None,
+        step_high_s=_pulse_s(table, "step_high_us"),
+        step_low_s=_pulse_s(table, "step_low_us"),
     )
+
+
+def _pulse_s(table: Table, key: str) -> float | None:
+    value_us = table.number(key, 0.0, at_least=0.0, at_most=1e6)
+    return 1e-6 * value_us if value_us > 0.0 else None
 
 
 def _link(table: Table) -> LinkSpec:

@@ -1,16 +1,17 @@
 """What a scene says, as frozen dataclasses in centimetres and radians."""
 
 from dataclasses import dataclass, field
-from math import ceil, floor, pi
+from math import ceil, floor
 from typing import Literal
 
 from planarm.errors import SceneError
 from planarm.scene.dc_motors import DcMotorSpec
+from planarm.scene.joint import JointSpec
 from planarm.scene.joint_space import JointSpaceSpec
 from planarm.scene.limit_switches import LimitSwitchSpec
 from planarm.scene.mechanics import Matrix, MechanicsSpec
-from planarm.scene.motor import MotorSpec
 from planarm.scene.moving import MovingSpec, ObstacleMotion
+from planarm.scene.pulses import short_pulse, short_pulse_words
 from planarm.scene.roadmap import RoadmapSpec
 from planarm.scene.task import Point, Range, TaskSpec
 from planarm_wire.boards import Board
@@ -129,31 +130,6 @@ class MotionSpec:
 
 
 @dataclass(frozen=True, slots=True)
-class JointSpec:
-    """A joint's stepper motor, gear and limits.
-
-    `reversed` is True when the motor's positive sense turns the joint clockwise; `zero_offset_rad` is the joint's angle
-    when all motors stand at micro-step 0. `max_jerk_rad_s3` is None where jerk has no limit.
-    """
-
-    steps_per_rev: int
-    microsteps: int
-    gear_ratio: float
-    driver: str
-    max_speed_rad_s: float
-    max_acceleration_rad_s2: float
-    reversed: bool = False
-    zero_offset_rad: float = 0.0
-    motor: MotorSpec = field(default_factory=MotorSpec)
-    max_jerk_rad_s3: float | None = None
-
-    @property
-    def usteps_per_rad(self) -> float:
-        """Micro-steps of the motor for one radian behind its gear, whatever the sense."""
-        return self.steps_per_rev * self.microsteps * self.gear_ratio / (2.0 * pi)
-
-
-@dataclass(frozen=True, slots=True)
 class LinkSpec:
     """Where the firmware is reached: port or URL, and the baud rate."""
 
@@ -187,21 +163,30 @@ class Scene:
     moving: MovingSpec | None = None
     """How to plan in space and time; None: obstacles rest."""
     wiring: str = OWN
-    """How the drivers are wired, a name of the wire's pin maps."""
+    """The wire's pin map: how the drivers are wired, and whether they need long pulses."""
 
     @property
     def board(self) -> Board:
         """The board that makes this arm's motions; its name is that of its flash image.
 
         Raises:
-            SceneError: no board of this wiring steps so many joints. Such an arm can be searched, not moved.
+            SceneError: no board of this wiring steps so many joints, or makes pulses as long as a driver needs. Such an
+                arm can be searched, not moved.
         """
         try:
-            return board_of(len(self.joints), self.wiring)
+            board = board_of(len(self.joints), self.wiring)
         except WireError as error:
             lengths = list(self.arm.link_lengths_cm)
             problem = f"{lengths}: {error} (board.wiring): it can be searched, but no motion is made"
             raise SceneError(self.source, "arm.link_lengths_cm", problem) from error
+        short = short_pulse(self.joints, self.coupling, board)
+        if short is not None:
+            joint = self.joints[short.joint - 1]
+            told = joint.step_high_s if short.level == "high" else joint.step_low_s
+            key = "driver" if told is None else f"step_{short.level}_us"
+            problem = short_pulse_words(joint.driver_row.title, short, board)
+            raise SceneError(self.source, f"joints[{short.joint}].{key}", problem)
+        return board
 
     @property
     def margin_cm(self) -> float:

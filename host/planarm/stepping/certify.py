@@ -13,7 +13,7 @@ from planarm.stepping.check_space import check_space
 from planarm.stepping.check_steps import check_counts, check_gaps
 from planarm.stepping.check_stop import check_stop
 from planarm.stepping.check_torque import check_torque
-from planarm.stepping.check_wire import check_wire
+from planarm.stepping.check_wire import check_pulses, check_wire
 from planarm.stepping.expand import expand
 from planarm.stepping.plan import SegmentPlan
 from planarm.stepping.poses import motor_positions
@@ -40,7 +40,7 @@ def certify(
     made = expand(plan)
     axes = motor_axes(scene.joints, scene.coupling)
     table, at = table_of(plan), motor_positions(made)
-    checks = check_wire(plan, table, scene.board)
+    checks = check_wire(plan, table, scene.board) + check_pulses(scene, made)
     checks += check_board(table, made, scene.link)
     for number in range(1, len(scene.joints) + 1):
         checks += check_counts(train, made, number)

@@ -4,9 +4,12 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from planarm.scene import Scene
+from planarm.scene.pulses import TICKS_US, low_ticks, pulse_ticks
 from planarm.stepping.certificate import Check, at_least, at_most
 from planarm.stepping.plan import SegmentPlan
 from planarm.stepping.table import SegmentTable
+from planarm.stepping.train import StepTrain
 from planarm_wire.boards import Board
 from planarm_wire.messages import (
     MAX_INTERVAL_TICKS,
@@ -33,6 +36,21 @@ def check_wire(plan: SegmentPlan, table: SegmentTable, board: Board) -> list[Che
         ticks, where = min(firsts)
         setting = "joints.max_acceleration_deg_s2"
         checks.append(at_least("DIR setup time at the start", ticks, MIN_DIR_SETUP_TICKS, "ticks", where, setting))
+    return checks
+
+
+def check_pulses(scene: Scene, made: StepTrain) -> list[Check]:
+    """Check that every driver's pulses are as long as it needs them."""
+    board, checks = scene.board, []
+    for number, (joint, steps) in enumerate(zip(scene.joints, made.steps, strict=True), start=1):
+        row = joint.driver_row
+        apart = int(np.diff(steps.ticks).min()) if len(steps.ticks) > 1 else MAX_INTERVAL_TICKS
+        for level, ticks, needed_s, setting in (
+            ("high", board.min_step_high_ticks, row.step_high_s, "joints.driver or board.wiring"),
+            ("low", low_ticks(board, apart), row.step_low_s, "joints.max_speed_deg_s, joints.driver or board.wiring"),
+        ):
+            name, needed = f"joint {number} step pulses {level}", pulse_ticks(needed_s)
+            checks.append(at_least(name, ticks / TICKS_US, needed / TICKS_US, "us", "", setting))
     return checks
 
 

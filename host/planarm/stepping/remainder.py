@@ -24,7 +24,7 @@ from planarm.stepping.certificate import Certificate, at_most
 from planarm.stepping.check_board import check_board
 from planarm.stepping.check_space import check_space
 from planarm.stepping.check_steps import check_gaps
-from planarm.stepping.check_wire import check_wire
+from planarm.stepping.check_wire import check_pulses, check_wire
 from planarm.stepping.expand import expand
 from planarm.stepping.plan import Allowance, SegmentPlan
 from planarm.stepping.poses import motor_positions
@@ -226,7 +226,7 @@ def certify_remainder(scene: Scene, left: StepTrain, plan: SegmentPlan) -> Certi
     axes = motor_axes(scene.joints, scene.coupling)
     made = expand(plan)
     table, at = table_of(plan), motor_positions(made)
-    checks = [*check_wire(plan, table, scene.board), *check_board(table, made, scene.link)]
+    checks = [*check_wire(plan, table, scene.board), *check_pulses(scene, made), *check_board(table, made, scene.link)]
     for number, (steps, wanted) in enumerate(zip(made.steps, left.steps, strict=True), start=1):
         differ = 0 if np.array_equal(steps.directions, wanted.directions) else len(wanted.directions)
         checks.append(at_most(f"joint {number} steps that differ from the plan", differ, 0, "steps"))

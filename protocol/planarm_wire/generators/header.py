@@ -50,7 +50,7 @@ _LAYOUT_HEAD = """
 static_assert(__BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__, "the wire's numbers are little-endian, as here");
 """
 
-BOARD_LIMITS = ("joints", "queue_bytes", "min_interval_ticks")
+BOARD_LIMITS = ("joints", "queue_bytes", "min_interval_ticks", "min_step_high_ticks", "min_step_low_ticks")
 
 _TAIL = """
 static_assert(HOST_WINDOW_BYTES < RX_RING_BYTES, "a full window fits the receive ring");
@@ -98,7 +98,7 @@ def wiring_h(board: Board) -> Callable[[Spec], str]:
             )
         ]
         parts.append(_constant("JOINTS", "uint8_t", str(wired.joints), "Joints that segments and ledger tell of."))
-        for name in ("queue_bytes", "min_interval_ticks"):
+        for name in BOARD_LIMITS[1:]:
             value = getattr(wired, name)
             parts.append(_constant(name.upper(), _type(value), str(value), docs[name].split(",")[0]))
         parts.append(_constant("PIN_MAP_CODE", "uint8_t", str(code), f"The pin map {wired.pin_map}."))

@@ -209,7 +209,8 @@ def _board(board: Board, ticks_hz: int) -> str:
     least = board.min_interval_ticks
     return (
         f"### {board.name}\n\n{sentence(board.doc)} Pin map {board.pin_map}; a queue of {board.queue_bytes} bytes; "
-        f"at least {least:,} ticks between two steps of a joint, {round(ticks_hz / least):,} steps/s. "
+        f"at least {least:,} ticks between two steps of a joint, {round(ticks_hz / least):,} steps/s; "
+        f"pulses high for at least {board.min_step_high_ticks} ticks and low for {board.min_step_low_ticks}. "
         f"ENABLE is {board.enable_pin}, the stop input {board.stop_pin}.\n\n"
         + _table(("joint", "STEP", "DIR", "limit switch"), rows)
     )

@@ -15,6 +15,10 @@ constexpr uint8_t JOINTS = 2;
 constexpr uint16_t QUEUE_BYTES = 848U;
 // Least time between two steps of one joint.
 constexpr uint16_t MIN_INTERVAL_TICKS = 320U;
+// Least high time of a step pulse.
+constexpr uint8_t MIN_STEP_HIGH_TICKS = 56;
+// Least low time of a step pulse.
+constexpr uint8_t MIN_STEP_LOW_TICKS = 40;
 // The pin map cnc_shield.
 constexpr uint8_t PIN_MAP_CODE = 1;
 // Step outputs, one a joint, as numbered on the board.
