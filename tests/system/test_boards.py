@@ -160,7 +160,7 @@ def test_the_same_drivers_lose_steps_by_shorter_pulses(tmp_path, monkeypatch):
     ("changes", "words"),
     [
         ({"high_us": 20.0}, r"joints\[1\].step_high_us: .* high for 20 us, the board uno makes them high for 3.5 us"),
-        ({"low_us": 300.0}, r"joints\[1\].step_low_us: .* low for 300 us, .* or lower max_speed_deg_s"),
+        ({"high_us": 3.0, "low_us": 300.0}, r"joints\[1\].step_low_us: .* low for 300 us, .* or lower max_speed_deg_s"),
     ],
 )
 def test_drivers_that_no_board_serves_are_refused(changes, words):
