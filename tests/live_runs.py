@@ -69,6 +69,16 @@ def scene_with_links(links):
 SCENE = scene_of()
 
 
+def with_jerk(scene, jerk_rad_s3):
+    """The scene with a limit of jerk in every joint."""
+    return replace(scene, joints=tuple(replace(joint, max_jerk_rad_s3=jerk_rad_s3) for joint in scene.joints))
+
+
+def by_time(scene, budget_s):
+    """The scene with its path optimised for time."""
+    return replace(scene, planner=replace(scene.planner, objective="time", budget_s=budget_s))
+
+
 def quiet(_stage, _share):
     pass
 

@@ -89,6 +89,7 @@ def plan_scene(scene: Scene, notice: Notice, route: Route | None = None) -> Plan
         search_ms=1e3 * route.search_s,
         joint=route.joint,
         bound_cm=motion.bound_cm,
+        mean=motion.mean,
         note=route.note,
     )
 

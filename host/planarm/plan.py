@@ -14,6 +14,7 @@ from planarm.stepping.certificate import Certificate
 from planarm.stepping.plan import SegmentPlan
 from planarm.stepping.train import StepTrain
 from planarm.trajectory.binding import TimingReport
+from planarm.trajectory.jerk import Mean
 from planarm.trajectory.motion import Trajectory
 from planarm.workspace.free_map import RegionMap
 
@@ -42,6 +43,8 @@ class Plan:
     """How the motion among moving obstacles was found; None where obstacles rest."""
     bound_cm: float | None = None
     """No path of the tip on the map is shorter; None where the path was searched, or optimised, in joint space."""
+    mean: Mean | None = None
+    """What the motion is the moving mean of; None where no joint's jerk is limited."""
     note: str = ""
     """In what the path is less than was asked for; empty when in nothing."""
 

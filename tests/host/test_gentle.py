@@ -32,7 +32,7 @@ def made_of(scene):
     margin_cm = planning_margin_cm(scene)
     limits = Limits.of(scene)
     fastest = fastest_motion(find_route(scene, margin_cm).smooth, limits)
-    return fastest, gentle_motion(scene, margin_cm - ROOM_CM, fastest, limits, jerk_limits(scene)), limits
+    return fastest, gentle_motion(scene, margin_cm - ROOM_CM, fastest, limits, jerk_limits(scene)).trajectory, limits
 
 
 def test_jerk_limits_and_room_are_kept():

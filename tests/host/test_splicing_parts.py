@@ -7,19 +7,21 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from live_runs import SCENE, circle, quiet, tip_at
-from planarm.errors import CertificateError, TimingError
+from live_runs import SCENE, by_time, circle, quiet, tip_at, with_jerk
+from planarm.errors import CertificateError, NoPathError, TimingError
 from planarm.link.packing import Packer
 from planarm.link.session import Session
 from planarm.link.stream import Stream
+from planarm.model.shapes import shape_of
 from planarm.model.transmission import motor_axes
 from planarm.motions.margin import planning_margin_cm
 from planarm.operations.replanning import first_plan
 from planarm.operations.splicing import Border, first_border, plan_from_border, why_not
-from planarm.smoothing.joint_spline import part_of, run_on
+from planarm.smoothing.joint_spline import part_of, run_on, scaled
 from planarm.stepping.certify import certify
 from planarm.stepping.schedule import with_first_steps
 from planarm.stepping.segments import Coding, compress, expand
+from planarm.trajectory.jerk import STEP_S, largest_jerks, mean_of
 from planarm.trajectory.limits import Limits
 from planarm.trajectory.timing import fastest_motion
 from planarm_wire.messages import SLICE_TICKS, STARVING_TICKS, TICKS_HZ
@@ -115,12 +117,68 @@ def test_a_border_leaves_the_device_enough_until_the_other_motion_is_there(plan,
     assert first_border(plan, 0, plan.trajectory.duration_s) is None
 
 
-def test_a_motion_with_a_limit_of_jerk_or_an_optimised_path_is_not_left(plan):
+def test_a_way_that_is_no_way_in_joint_space_is_not_left(plan):
     assert why_not(plan) == ""
-    joints = tuple(replace(joint, max_jerk_rad_s3=100.0) for joint in SCENE.joints)
-    assert "max_jerk" in why_not(replace(plan, scene=replace(SCENE, joints=joints)))
-    optimised = replace(SCENE, planner=replace(SCENE.planner, objective="time"))
-    assert "optimised" in why_not(replace(plan, scene=optimised))
+    assert "no way in joint space" in why_not(replace(plan, joint=None))
+
+
+@pytest.mark.parametrize("share", [0.2, 0.35, 0.5, 0.8])
+def test_a_mean_that_is_left_goes_on_with_the_same_speed_and_acceleration(plan, share):
+    """Up to the step nothing changes, and behind it the jerk is bounded by both motions' accelerations."""
+    whole, jerks = plan.trajectory, np.array([250.0, 250.0])
+    mean = mean_of(whole, jerks)
+    before, step = mean.trajectory(plan.trajectory.path.arm), int(share * whole.duration_s / STEP_S)
+    at_s, rate = whole.path_at(step * STEP_S)
+    end_s = float(whole.path.borders_s[-1])
+    harder = replace(LIMITS, accelerations_rad_s2=1.15 * LIMITS.accelerations_rad_s2)
+    rest = fastest_motion(part_of(whole.path, at_s, end_s), harder, start_rate=rate)
+    other = mean.left_for(whole.left_for(whole.path, step * STEP_S, rest), step)
+    after = other.trajectory(plan.trajectory.path.arm)
+    t_s = np.linspace(0.0, step * STEP_S, 500)[:-1]
+    for made, wanted in zip(after.sample(t_s), before.sample(t_s), strict=True):
+        assert np.abs(made - wanted).max() < 1e-9
+    near_s = np.array([step * STEP_S - 1e-6, step * STEP_S + 1e-6])
+    for values in after.sample(near_s):
+        assert np.abs(np.diff(values, axis=0)).max() < 1e-2
+    assert after.sample(np.array([after.duration_s]))[0][0] == pytest.approx(whole.q_rad[-1], abs=1e-9)
+    assert other.keeps(jerks) == bool((largest_jerks(after)[0] <= jerks).all())
+
+
+def test_a_scaled_path_is_the_same_path(plan):
+    path = plan.trajectory.path
+    other = scaled(path, 3.0)
+    s = np.linspace(0.0, float(other.borders_s[-1]), 200)
+    state, wanted = other.evaluate(s), path.evaluate(3.0 * s)
+    assert np.abs(state.q_rad - wanted.q_rad).max() < 1e-9
+    assert np.abs(state.dq_rad - 3.0 * wanted.dq_rad).max() < 1e-9
+    assert np.abs(state.ddq_rad - 9.0 * wanted.ddq_rad).max() < 1e-7
+
+
+@pytest.mark.parametrize("scene", [with_jerk(SCENE, 250.0), by_time(SCENE, 0.2)], ids=["jerk", "time"])
+def test_other_motions_are_left_at_speed_and_acceleration(scene):
+    """Around an obstacle: certified, the same up to the border, without a jump of speed, with limits of jerk of
+    acceleration either; and where nothing leads on it says so."""
+    task, plan = first_plan(scene, quiet)
+    border, margin_cm = first_border(plan, 0, 0.1), planning_margin_cm(scene)
+    obstacle = circle(*tip_at(plan, 0.8), 2.0)
+    _, changes = task.roadmap.add_obstacle(shape_of(obstacle))
+    task.planner.change(changes)
+    among = replace(scene, obstacles=(obstacle,))
+    other = plan_from_border(among, task, plan, border, 0.0, margin_cm)
+    assert other.certificate.ok
+    assert not certify(among, plan.trajectory, plan.train, plan.segments).ok
+    assert other.segments.segments[: border.segment] == plan.segments.segments[: border.segment]
+    t_s = np.linspace(0.0, border.path_s, 300)[:-1]
+    assert np.abs(other.trajectory.sample(t_s)[0] - plan.trajectory.sample(t_s)[0]).max() < 1e-7
+    t_s = np.arange(0.0, other.trajectory.duration_s, 1e-3)
+    _, speeds, accelerations = other.trajectory.sample(t_s)
+    most = max(joint.max_acceleration_rad_s2 for joint in scene.joints)
+    assert np.abs(np.diff(speeds, axis=0)).max() < 1.1e-3 * most
+    if scene.joints[0].max_jerk_rad_s3 is not None:
+        assert np.abs(np.diff(accelerations, axis=0)).max() < 1.05e-3 * scene.joints[0].max_jerk_rad_s3
+    closed = circle(*tip_at(plan, 1.0), 3.0)
+    with pytest.raises((NoPathError, TimingError, CertificateError)):
+        plan_from_border(replace(scene, obstacles=(closed,)), task, plan, border, 0.0, margin_cm)
 
 
 def test_clearance_is_looked_at_from_where_the_arm_is(plan):

@@ -5,11 +5,12 @@ from time import perf_counter
 import numpy as np
 import pytest
 
-from live_runs import SCENE, Outcome, circle, quiet, scene_with_links, tip_at
+from live_runs import SCENE, Outcome, by_time, circle, quiet, scene_with_links, tip_at, with_jerk
 from planarm.operations.beside import AsLong
 from planarm.operations.replanning import first_plan
 from planarm.scene.arrivals import Arrival
 from planarm.stepping.segments import expand
+from planarm.trajectory.jerk import largest_jerks
 from planarm_wire.messages import TICKS_HZ
 
 PLANNING_S = 0.08
@@ -194,3 +195,51 @@ def test_arms_of_three_and_four_links_go_on_at_speed(links, sized, capsys):
         with capsys.disabled():
             counts = {verdict: verdicts.count(verdict) for verdict in ("kept", "avoided", "unavoidable")}
             print(f"\n{links} links: {counts}, goal reached {reached}, left at speed {spliced}, on time {on_time}")
+
+
+JERK_RAD_S3 = 250.0
+KINDS = {
+    "jerk": with_jerk(SCENE, JERK_RAD_S3),
+    "time": by_time(SCENE, 0.2),
+    "time and jerk": by_time(with_jerk(SCENE, JERK_RAD_S3), 0.2),
+}
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_motions_with_a_limit_of_jerk_or_optimised_for_time_go_on_at_speed(kind, sized, capsys):
+    """Random obstacles at random times: no lost step and no contact; the goal, or a reason for the stop.
+
+    What is left at speed makes every step at its certified time, and keeps the jerk across the border.
+    """
+    scene = KINDS[kind]
+    first = first_plan(scene, quiet)[1]
+    assert first.certificate.ok, first.certificate.explain()
+    rng = np.random.default_rng(len(kind))
+    verdicts, reached, spliced, stops = [], 0, 0, []
+    for number in range(sized(3, 100)):
+        share = float(rng.uniform(0.05, 0.4))
+        near = tip_at(first, min(1.0, share + float(rng.uniform(0.3, 0.6)))) + rng.normal(0.0, 1.5, 2)
+        arrival = Arrival(share * first.trajectory.duration_s, circle(*near, rng.uniform(1.0, 3.0)))
+        done = Outcome([arrival], scene, prompt())
+        (one,) = done.result.encounters
+        verdicts.append(one.verdict)
+        stops += [one.stopped_because] if one.stopped_because else []
+        reached += done.result.reached
+        assert done.result.reached or done.result.reason, (number, arrival)
+        assert not any(done.record.lost_full_steps), (number, arrival)
+        assert not done.record.broken_rules, (number, arrival)
+        assert one.verdict != "avoided" or one.stopped_because or done.spliced, (number, arrival)
+        done.require_clear()
+        if done.spliced and len(done.spliced) == len(done.result.new_plans):
+            spliced += 1
+            told = done.comparison()
+            assert told.agrees, (number, told.explain())
+            assert told.max_timing_error_ticks <= PIN_TICKS, (number, arrival)
+            last = done.result.plans[-1]
+            assert last.certificate.ok
+            assert "jerk" not in kind or (largest_jerks(last.trajectory)[0] <= JERK_RAD_S3).all()
+    if len(verdicts) >= 100:
+        counts = {verdict: verdicts.count(verdict) for verdict in ("kept", "avoided", "unavoidable")}
+        with capsys.disabled():
+            print(f"\n{kind}: {counts}, goal reached {reached}, left at speed {spliced}")
+        assert spliced > 0.4 * counts["avoided"], stops

@@ -22,6 +22,7 @@ from planarm.search.path import Path as TipPath
 from planarm.stepping.schedule import encode, schedule
 from planarm.stepping.slowing import SpeedLimit, road_ticks
 from planarm.trajectory.binding import TimingReport, report_timing
+from planarm.trajectory.jerk import Mean
 from planarm.trajectory.limits import Limits
 from planarm.trajectory.motion import Trajectory
 from planarm.trajectory.timing import fastest_motion
@@ -50,6 +51,8 @@ class Motion:
     timing: TimingReport
     path: TipPath
     bound_cm: float | None
+    mean: Mean | None = None
+    """Of what it is the mean, where jerk is limited."""
 
 
 def motion_along(scene: Scene, route: Route, margin_cm: float, notice: Notice) -> Motion:
@@ -60,12 +63,13 @@ def motion_along(scene: Scene, route: Route, margin_cm: float, notice: Notice) -
         trajectory = optimised(scene, margin_cm, trajectory, limits, notice)
         path, bound_cm = TipPath.through(tip_curve_cm(trajectory, Arm.from_spec(scene.arm)), path.elbow), None
     timing, jerks = report_timing(trajectory, limits), jerk_limits(scene)
-    if jerks is None:
+    if jerks is None or trajectory.duration_s <= 0.0:
         return Motion(trajectory, lambda limit: timed(scene, trajectory, limits, limit), timing, path, bound_cm)
     # Not timed anew: where a stop lacks road, the device slows down by itself.
-    gentle = gentle_motion(scene, margin_cm - ROOM_CM, trajectory, limits, jerks)
+    made = gentle_motion(scene, margin_cm - ROOM_CM, trajectory, limits, jerks)
+    gentle = made.trajectory
     timing = replace(timing, duration_s=gentle.duration_s, executed_s=gentle.duration_s)
-    return Motion(gentle, lambda _limit: timed(scene, gentle, limits, None), timing, path, bound_cm)
+    return Motion(gentle, lambda _limit: timed(scene, gentle, limits, None), timing, path, bound_cm, made.mean)
 
 
 def timed(scene: Scene, fastest: Trajectory, limits: Limits, limit: SpeedLimit | None) -> Trajectory:

@@ -52,6 +52,7 @@ Floats = NDArray[np.float64]
 MOST_LEGS = 20
 LOOK_AGAIN_S = 0.005
 """So soon the sources of obstacles, and the work on another motion, are looked at again."""
+LEAST_PLANNING_S = 0.03
 AHEAD_S = 0.1
 """Path that the device holds beyond what a stop takes: what it holds cannot be changed any more."""
 
@@ -222,7 +223,7 @@ class _Run:
             return "" if contact_s > self.splice.border.path_s else "it is before where the motion is left"
         if problem := why_not(self.plan):
             return problem
-        ready_s = most_s + self.beside.allow_s(1e-3 * self.plans[-1].plan_ms)
+        ready_s = most_s + self.beside.allow_s(self._planning_s())
         border = first_border(self.plan, stream.sent_segments, ready_s)
         if border is None:
             return "too little of the motion is left"
@@ -232,6 +233,12 @@ class _Run:
         work = self._begin(border, contact_s, least_s, now_s)
         self.splice = _Splice(border, contact_s, now_s, work, len(self.encounters) - 1)
         return ""
+
+    def _planning_s(self) -> float:
+        """Return how long planning took last, without what an optimiser was given: nothing is while the arm moves."""
+        made, planner = self.plans[-1], self.plan.scene.planner
+        optimised = planner.objective == "time" and (not self.new_plans or self.new_plans[-1].spliced_at_s is None)
+        return max(LEAST_PLANNING_S, 1e-3 * made.plan_ms - (planner.budget_s if optimised else 0.0))
 
     def _begin(self, first: Border, contact_s: float, from_s: float, now_s: float) -> Future[tuple[Plan, Border]]:
         """Begin to plan a motion that leaves the one that streams."""

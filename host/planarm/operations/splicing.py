@@ -17,28 +17,27 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from math import ceil
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from planarm.errors import CertificateError, NoPathError, PlanarmError, TimingError
-from planarm.model.arm import Arm
+from planarm.operations.tails import Tail, tails_along_tangents, tails_at_corners
 from planarm.plan import Plan
-from planarm.roadmap.planning import RoadmapTask, ways_on
+from planarm.roadmap.planning import RoadmapTask
+from planarm.routes.gentle import ROOM_CM, gentle_rest, jerk_limits
 from planarm.routes.route import route_through
 from planarm.scene import Scene
-from planarm.smoothing.joint_blend import blend_poses
 from planarm.smoothing.joint_spline import JointSpline, part_of, run_on
 from planarm.stepping.certify import certify
 from planarm.stepping.schedule import go_on
 from planarm.stepping.slowing import SpeedLimit, link_margin_ticks
 from planarm.trajectory.binding import report_timing
+from planarm.trajectory.jerk import STEP_S
 from planarm.trajectory.limits import Limits
 from planarm.trajectory.motion import Trajectory
 from planarm.trajectory.timing import fastest_motion
-from planarm.workspace.joint_proof import JointWorld, joint_world, prove_joint_line
-from planarm.workspace.proof import PROVED
+from planarm.workspace.joint_proof import JointWorld, joint_world
 from planarm_wire.messages import NEED_UNIT_TICKS, SLICE_TICKS, STARVING_TICKS, TICKS_HZ
 from planarm_wire.rates import MESSAGE_SEGMENTS
 from planarm_wire.steps import duration_ticks
@@ -47,10 +46,6 @@ Floats = NDArray[np.float64]
 
 HANDED_OVER_TICKS = 4 * SLICE_TICKS
 """The device decides this long ahead whether it has to slow down."""
-MOST_CORNERS = 6
-"""Corners of the old way up to which it may be left."""
-BETWEEN_RAD = 0.15
-"""Between corners it may be left about so often."""
 MOST_BORDERS = 4
 APART_S = 0.06
 """A motion that cannot be left at the first border is tried to be left later, so far apart."""
@@ -73,10 +68,6 @@ class Border:
 
 def why_not(plan: Plan) -> str:
     """Say why a motion of this kind is not left at speed; empty when it can be."""
-    if plan.scene.planner.objective == "time":
-        return "its path is optimised for time"
-    if any(joint.max_jerk_rad_s3 is not None for joint in plan.scene.joints):
-        return "joints.max_jerk_deg_s3 is set"
     if not isinstance(plan.trajectory.path, JointSpline) or plan.joint is None:
         return "its path is no way in joint space"
     return ""
@@ -160,15 +151,14 @@ def plan_from_border(
     """
     began_s, tries = time.perf_counter(), 0
     problem: PlanarmError = NoPathError(f"{scene.source}: no way leads on from the corners ahead")
-    for tail in _tails(scene, task, before, border, joint_world(scene, margin_cm)):
-        try:
-            fastest_motion(tail.path, Limits.of(scene), start_rate=before.trajectory.path_at(border.path_s)[1])
-        except TimingError as error:
-            problem = error
+    left = _Left.of(before, border)
+    for tail in _timed_tails(scene, task, before, left, joint_world(scene, margin_cm)):
+        if isinstance(tail, TimingError):
+            problem = tail
             continue
         tries += 1
         try:
-            return _joined(scene, before, border, from_s, margin_cm, tail, began_s)
+            return _joined(scene, before, border, left, from_s, margin_cm, tail, began_s)
         except (TimingError, CertificateError) as error:
             problem = error
         if tries == MOST_TRIES:
@@ -177,104 +167,84 @@ def plan_from_border(
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Tail:
-    """A way from the border on."""
+class _Left:
+    """What is left, and where: with limits of jerk not the motion that streams but what that is the mean of."""
 
+    motion: Trajectory
     path: JointSpline
-    poses_rad: Floats
-    """Of the whole way, the old part included."""
-    cost: float
+    t_s: float
+    s: float
+    rate: float
+    """ds/dt there."""
+
+    @classmethod
+    def of(cls, plan: Plan, border: Border) -> _Left:
+        motion = plan.trajectory if plan.mean is None else plan.mean.motion
+        assert isinstance(motion.path, JointSpline), "`why_not` said so"
+        t_s = border.path_s if plan.mean is None else STEP_S * _step_at(border)
+        return cls(motion, motion.path, t_s, *motion.path_at(t_s))
 
 
-def _tails(scene: Scene, task: RoadmapTask, before: Plan, border: Border, world: JointWorld) -> Iterator[_Tail]:
-    """Yield ways that leave the old one, at one of its next corners or between them, the cheapest first."""
-    path, route = before.trajectory.path, before.joint
-    assert isinstance(path, JointSpline) and route is not None, "`why_not` said so"
-    at_s, _ = before.trajectory.path_at(border.path_s)
-    ahead = _ahead(path, route.poses_rad, at_s, world)
-    ways = ways_on(task, world, np.array(ahead.poses_rad)) if ahead.poses_rad else []
-    for cost, k, way in ways:
-        straight_s = _straight_from(path, max(at_s, ahead.leg_s[k]))
-        if straight_s < ahead.s[k]:
-            turned = _turned(path, straight_s, way, scene, world)
-            rest = turned if straight_s == at_s else run_on([part_of(path, at_s, straight_s), turned])
-            yield _Tail(rest, np.concatenate([route.poses_rad[: ahead.corner[k]], way]), cost)
+def _step_at(border: Border) -> int:
+    """Return the first step of a mean that is not before a border."""
+    return ceil(border.path_s / STEP_S)
 
 
-class _Ahead(NamedTuple):
-    """Where an old way may be left: at corners, and between them."""
+def _timed_tails(
+    scene: Scene, task: RoadmapTask, before: Plan, left: _Left, world: JointWorld
+) -> Iterator[Tail | TimingError]:
+    """Yield the ways that lead on and can be begun at the speed, and why others cannot.
 
-    poses_rad: list[Floats]
-    s: list[float]
-    """The path parameter of each."""
-    leg_s: list[float]
-    """That of the corner before it."""
-    corner: list[int]
-    """How many corners of the old way are before it."""
-
-
-def _ahead(path: JointSpline, poses: Floats, at_s: float, world: JointWorld) -> _Ahead:
-    """Return where an old way may be left, as far as its legs are still free."""
-    corners_s = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(poses, axis=0), axis=1))])
-    first = int(np.searchsorted(corners_s, at_s))
-    start = path.evaluate(np.array([at_s])).q_rad[0]
-    found = _Ahead([], [], [], [])
-    for k in range(first, min(first + MOST_CORNERS, len(poses))):
-        leg = poses[k] - poses[k - 1]
-        parts = max(1, ceil(float(np.linalg.norm(leg)) / BETWEEN_RAD))
-        since = start if k == first else poses[k - 1]
-        for part in range(1, parts + 1):
-            pose = poses[k] if part == parts else poses[k - 1] + part / parts * leg
-            s = float(corners_s[k - 1] + part / parts * (corners_s[k] - corners_s[k - 1]))
-            if s <= at_s:
-                continue
-            if (k == len(poses) - 1 and part == parts) or prove_joint_line(world, since, pose)[0] != PROVED:
-                return found
-            since = pose
-            found.poses_rad.append(pose)
-            found.s.append(s)
-            found.leg_s.append(float(corners_s[k - 1]))
-            found.corner.append(k)
-    return found
-
-
-def _turned(path: JointSpline, straight_s: float, way: Floats, scene: Scene, world: JointWorld) -> JointSpline:
-    """Return a path that runs straight on from there to where `way` begins, and along it."""
-    start = path.evaluate(np.array([straight_s])).q_rad
-    # All of what is left of the leg may be used for the corner: as if the leg were twice as long.
-    blended = blend_poses(
-        np.concatenate([2.0 * start - way[:1], way]), Arm.from_spec(scene.arm), world, _tolerance_cm(scene), proved=True
-    )
-    return part_of(blended, float(np.linalg.norm(way[0] - start[0])), float(blended.borders_s[-1]))
-
-
-def _straight_from(path: JointSpline, s: float) -> float:
-    """Return the first parameter from s on at which the path runs straight."""
-    piece = int(np.clip(np.searchsorted(path.borders_s, s, side="right") - 1, 0, len(path.coefficients) - 1))
-    while piece + 1 < len(path.coefficients) and path.coefficients[piece, 2:].any():
-        piece += 1
-        s = float(path.borders_s[piece])
-    return s
+    The cheapest come first, or where time is the objective the quickest of all.
+    """
+    limits, route = Limits.of(scene), before.joint
+    by_time = scene.planner.objective == "time"
+    assert route is not None, "`why_not` said so"
+    if by_time:
+        tails = tails_along_tangents(scene, task, left.path, left.s, world)
+    else:
+        tails = tails_at_corners(scene, task, left.path, route.poses_rad, left.s, world)
+    timed: list[tuple[float, Tail]] = []
+    for tail in tails:
+        try:
+            duration_s = fastest_motion(tail.path, limits, start_rate=left.rate).duration_s
+        except TimingError as error:
+            yield error
+            continue
+        if by_time:
+            timed.append((duration_s, tail))
+        else:
+            yield tail
+    yield from (tail for _, tail in sorted(timed, key=lambda one: one[0]))
 
 
 def _joined(
-    scene: Scene, before: Plan, border: Border, from_s: float, margin_cm: float, tail: _Tail, began_s: float
+    scene: Scene, before: Plan, border: Border, left: _Left, from_s: float, margin_cm: float, tail: Tail, began_s: float
 ) -> Plan:
     """Return the whole motion along the old path and a tail.
 
     Raises:
         TimingError, CertificateError: as `plan_from_border`.
     """
-    old, limits = before.trajectory, Limits.of(scene)
-    assert isinstance(old.path, JointSpline), "`why_not` said so"
-    at_s, rate = old.path_at(border.path_s)
-    path = run_on([part_of(old.path, 0.0, at_s), tail.path])
+    limits, mean = Limits.of(scene), None
+    path = run_on([part_of(left.path, 0.0, left.s), tail.path])
 
     def timed(limit: SpeedLimit | None) -> Trajectory:
-        cap = None if limit is None else partial(_from, limit, at_s)
-        return old.left_for(path, border.path_s, fastest_motion(tail.path, limits, cap, start_rate=rate))
+        cap = None if limit is None else partial(_from, limit, left.s)
+        return left.motion.left_for(path, left.t_s, fastest_motion(tail.path, limits, cap, start_rate=left.rate))
 
-    trajectory, train, segments = go_on(scene, timed, (before.train, before.segments), border.segment)
+    if before.mean is not None:
+        jerks = jerk_limits(scene)
+        assert jerks is not None, "a mean is made where jerk is limited"
+        paths = path, tail.path
+        gentle = gentle_rest(scene, margin_cm - ROOM_CM, before.mean, _step_at(border), paths, limits, jerks)
+        mean = gentle.mean
+
+    def under(limit: SpeedLimit | None) -> Trajectory:
+        # A mean is not timed anew: where a stop lacks road, the device slows down by itself.
+        return timed(limit) if mean is None else gentle.trajectory
+
+    trajectory, train, segments = go_on(scene, under, (before.train, before.segments), border.segment)
     certificate = certify(scene, trajectory, train, segments, from_ticks=int(from_s * TICKS_HZ))
     if not certificate.ok:
         raise CertificateError(f"the new motion is not certified: {certificate.explain()}")
@@ -284,7 +254,7 @@ def _joined(
         scene=scene,
         free_map=route.free_map,
         path=route.path,
-        smooth_path=path,
+        smooth_path=trajectory.path,
         trajectory=trajectory,
         train=train,
         segments=segments,
@@ -293,13 +263,10 @@ def _joined(
         timing=report_timing(trajectory, limits),
         search_ms=0.0,
         joint=route.joint,
+        mean=mean,
     )
 
 
 def _from(limit: SpeedLimit, start_s: float, s: Floats) -> Floats:
     """Return a limit of the speed along a path for a part of it that begins at `start_s`."""
     return limit(start_s + s)
-
-
-def _tolerance_cm(scene: Scene) -> float | None:
-    return None if scene.motion.corners == "stop" else scene.motion.tolerance_cm

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -13,7 +14,7 @@ from planarm.scene import Scene
 from planarm.smoothing.joint_spline import JointSpline
 from planarm.smoothing.smooth_path import Floats
 from planarm.trajectory.check import limit_use
-from planarm.trajectory.jerk import averaged, largest_jerks
+from planarm.trajectory.jerk import STEP_S, Mean, largest_jerks, mean_of
 from planarm.trajectory.limits import Limits
 from planarm.trajectory.motion import Trajectory
 from planarm.trajectory.timing import fastest_motion
@@ -38,15 +39,21 @@ def jerk_limits(scene: Scene) -> Floats | None:
     return np.array([np.inf if limit is None else limit for limit in limits])
 
 
-def gentle_motion(
-    scene: Scene, margin_cm: float, fastest: Trajectory, limits: Limits, jerks_rad_s3: Floats
-) -> Trajectory:
+@dataclass(frozen=True, slots=True, eq=False)
+class Gentle:
+    """A motion that keeps limits of jerk, and of what it is the mean."""
+
+    trajectory: Trajectory
+    mean: Mean
+
+
+def gentle_motion(scene: Scene, margin_cm: float, fastest: Trajectory, limits: Limits, jerks_rad_s3: Floats) -> Gentle:
     """Return a motion near to a timed one, within the limits and the jerks, proved free on a tenth of its own grid.
 
     Args:
         scene: the scene.
         margin_cm: least distance of a link's centre line to an obstacle.
-        fastest: the fastest motion along the path.
+        fastest: the fastest motion along the path, longer than a moment.
         limits: what it was timed under.
         jerks_rad_s3: the largest jerk of each joint, inf for none.
 
@@ -54,24 +61,75 @@ def gentle_motion(
         TimingError: however gently it is driven, it is not free or does not keep a limit; the message says which, where
             and what to change.
     """
-    if fastest.duration_s <= 0.0:
-        return fastest
+
+    def driven(share: float) -> Mean:
+        slower = replace(limits, accelerations_rad_s2=share * limits.accelerations_rad_s2)
+        return mean_of(fastest if share == 1.0 else fastest_motion(fastest.path, slower), jerks_rad_s3)
+
+    return _gentlest(scene, margin_cm, limits, jerks_rad_s3, driven, 0)
+
+
+def gentle_rest(
+    scene: Scene,
+    margin_cm: float,
+    before: Mean,
+    step: int,
+    paths: tuple[JointSpline, JointSpline],
+    limits: Limits,
+    jerks_rad_s3: Floats,
+) -> Gentle:
+    """Return a motion that leaves the mean of another at a step, for another path, at its speed and acceleration.
+
+    Args:
+        scene: the scene.
+        margin_cm: least distance of a link's centre line to an obstacle, from that step on.
+        before: what is left.
+        step: of its mean; earlier ones stay as they are.
+        paths: the whole path, and the part of it after the step.
+        limits: what the joints can.
+        jerks_rad_s3: as `gentle_motion`.
+
+    Raises:
+        TimingError: as `gentle_motion`; or the motion cannot be slowed down in time for what follows.
+    """
+    whole, rest = paths
+    rate = before.motion.path_at(step * STEP_S)[1]
+
+    def driven(share: float) -> Mean:
+        slower = replace(limits, accelerations_rad_s2=share * limits.accelerations_rad_s2)
+        motion = fastest_motion(rest, slower, start_rate=rate)
+        return before.left_for(before.motion.left_for(whole, step * STEP_S, motion), step)
+
+    return _gentlest(scene, margin_cm, limits, jerks_rad_s3, driven, step)
+
+
+def _gentlest(
+    scene: Scene,
+    margin_cm: float,
+    limits: Limits,
+    jerks_rad_s3: Floats,
+    driven: Callable[[float], Mean],
+    first: int,
+) -> Gentle:
+    """Return the mean driven with the largest share of the acceleration that keeps everything, from a step on."""
     arm, world = Arm.from_spec(scene.arm), joint_world(scene, margin_cm)
-    motion, share, problem = fastest, 1.0, ""
+    share, problem = 1.0, ""
     for _ in range(MOST_ROUNDS):
-        made = averaged(motion, arm, jerks_rad_s3)
+        mean = driven(share)
+        if not mean.keeps(jerks_rad_s3):  # a window that was given, of a motion that is left
+            problem, share = "has too much jerk where it leaves the one before", GENTLER * share
+            continue
+        made = mean.trajectory(arm)
         path = made.path
         assert isinstance(path, JointSpline)
-        verdict, s = prove_pieces(world, path.borders_s, path.coefficients)
+        verdict, s = prove_pieces(world, path.borders_s[first:], path.coefficients[first:])
         if verdict != PROVED:
             problem = f"is not free at {path.place(float(s))}"
         else:
-            problem = _beyond(motion, made, arm, scene, limits, jerks_rad_s3)
+            problem = _beyond(mean.motion, made, arm, scene, limits, jerks_rad_s3)
         if not problem:
-            return made
+            return Gentle(made, mean)
         share *= GENTLER
-        slower = replace(limits, accelerations_rad_s2=share * limits.accelerations_rad_s2)
-        motion = fastest_motion(fastest.path, slower)
     raise TimingError(
         f"{scene.source}: with the limits of jerk the motion {problem}, even at {100.0 * share:.2g} % of the "
         "acceleration; raise joints.max_jerk_deg_s3 or motion.tolerance_cm, or leave it more workspace.clearance_cm"

@@ -71,6 +71,14 @@ def run_on(splines: Sequence[JointSpline]) -> JointSpline:
     return replace(whole, stops_s=np.unique(np.concatenate(stops)))
 
 
+def scaled(spline: JointSpline, factor: float) -> JointSpline:
+    """Return the same path with a parameter that grows slower by a factor: dq/ds is so many times as large."""
+    powers = factor ** np.arange(4.0)
+    return JointSpline(
+        spline.arm, spline.borders_s / factor, spline.coefficients * powers[:, None], spline.stops_s / factor
+    )
+
+
 def part_of(spline: JointSpline, from_s: float, to_s: float) -> JointSpline:
     """Return the part between two parameters, from < to; its own parameter begins at 0."""
     borders = spline.borders_s
