@@ -1,10 +1,11 @@
 """Leaving a motion for another while it runs: where, and along which path; the arm does not stop for it.
 
 A motion is left at a border between two of its segments that were not sent yet. Up to there its segments stay as they
-are. From there on the path runs straight on to one of the old way's next corners and follows the repaired way from that
-one, the corner rounded as any; the timing begins with the speed that the old motion has at the border. The result is
-one motion from the first start to the goal, whose first segments are the old ones. It is certified as a whole, but for
-the clearance of what is past.
+are. From there on the path runs straight on to one of the old way's next corners, or along its tangent where it is a
+curve, and follows the repaired way from there, the corner rounded as any (`planarm.operations.tails`); the timing
+begins with the speed that the old motion has at the border, and with limits of jerk with its acceleration. The result
+is one motion from the first start to the goal, whose first segments are the old ones. It is certified as a whole, but
+for the clearance of what is past.
 
 What keeps the arm safe meanwhile is the device: nothing behind the border is sent, so it rests before it by itself,
 and the border is chosen before the obstacle.
