@@ -1,25 +1,43 @@
 #include "clock.h"
 
+#include "fixed.h"
+#include "hal_base.h"
 #include "hal_step_timer.h"
 
 namespace planarm {
 namespace clock {
 
 namespace {
-uint32_t latest_ticks;
-uint32_t begun_ticks;  // when the pass began
+
+struct Clock {
+    uint32_t latest_ticks;  // of the device's
+    uint32_t stood_ticks;   // by which the motion's is behind
+    // When the pass began, by both.
+    uint32_t begun_device_ticks;
+    uint32_t begun_ticks;
+};
+
+Clock state;
+
+Clock& current() { return hal::by_base(state); }
+
 }  // namespace
 
-void reset(uint32_t ticks) { latest_ticks = begun_ticks = ticks; }
+void reset(uint32_t ticks) {
+    Clock& at = current();
+    at.latest_ticks = at.begun_device_ticks = at.begun_ticks = ticks;
+    at.stood_ticks = 0;
+}
 
 uint32_t extend(uint16_t counter) {
-    latest_ticks += static_cast<uint16_t>(counter - static_cast<uint16_t>(latest_ticks));
-    return latest_ticks;
+    Clock& at = current();
+    at.latest_ticks += static_cast<uint16_t>(counter - static_cast<uint16_t>(at.latest_ticks));
+    return at.latest_ticks - at.stood_ticks;
 }
 
 // A lap that is due or counted while this looks begins it again. In this order: once it is counted it is due
 // no more.
-uint32_t now() {
+void begin_pass() {
     uint8_t laps;
     uint16_t counter;
     do {
@@ -27,18 +45,35 @@ uint32_t now() {
         const hal::InterruptLock lock;
         counter = hal::counter();
     } while (hal::lap_is_due() || laps != hal::laps());
+    Clock& at = current();
     const uint32_t ticks = (static_cast<uint32_t>(laps) << 16) | counter;
-    latest_ticks += (ticks - latest_ticks) & 0xFFFFFF;
-    return latest_ticks;
+    increase(at.latest_ticks, (ticks - at.latest_ticks) & 0xFFFFFF);
+    at.begun_device_ticks = at.latest_ticks;
+    at.begun_ticks = at.begun_device_ticks - at.stood_ticks;
 }
 
-void begin_pass() { begun_ticks = now(); }
+void begin_pass_at(uint32_t ticks) { current().begun_ticks = ticks; }
 
-void begin_pass_at(uint32_t ticks) { begun_ticks = ticks; }
+uint32_t pass_ticks() { return current().begun_device_ticks; }
 
-uint32_t pass_ticks() { return begun_ticks; }
+uint32_t device_ticks(uint32_t ticks) { return ticks + current().stood_ticks; }
 
-int32_t ticks_until(uint32_t ticks) { return static_cast<int32_t>(ticks - begun_ticks); }
+int32_t ticks_until(uint32_t ticks) { return static_cast<int32_t>(ticks - current().begun_ticks); }
+
+void stand_before(uint32_t ticks) {
+    Clock& at = current();
+    // Whole laps are 2^16 ticks.
+    const uint16_t laps = static_cast<uint16_t>(((at.begun_ticks - ticks) >> 16) + 1);
+    const uint32_t back_ticks = static_cast<uint32_t>(laps) << 16;
+    at.stood_ticks += back_ticks;
+    at.begun_ticks -= back_ticks;
+}
+
+void end_standing() {
+    Clock& at = current();
+    at.stood_ticks = 0;
+    at.begun_ticks = at.begun_device_ticks;
+}
 
 }  // namespace clock
 }  // namespace planarm

@@ -31,9 +31,6 @@ class Cursor {
     // The segment lasts so long.
     void finish(uint32_t segment_ticks);
 
-    // The clock stood still for `ticks`.
-    void shift(uint32_t ticks) { increase(last_ticks_, ticks); }
-
   private:
     // The next steps of a slice. Times are in 2^-16 ticks from the tick of the first of them, modulo 2^32:
     // steps of one slice are less than 65,536 ticks apart.

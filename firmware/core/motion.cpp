@@ -25,7 +25,8 @@ constexpr int32_t PREPARE_AHEAD_TICKS = wire::MIN_LEAD_TICKS;
 // Segments must have come this long before they start: 2.5 ms.
 constexpr int32_t LATEST_ARRIVAL_TICKS = 40000;
 
-// After a rest on the path the joints start this long after they are told to: their DIR pins are set by then.
+// After a rest on the path the joints start so long after they are told to at the earliest: their DIR pins
+// are set by then.
 constexpr uint32_t THAW_LEAD_TICKS = 16000;
 
 // A payload that still fits means that more can come.
@@ -258,6 +259,7 @@ void Motion::clear() {
     slice.begin_with(override_stretch);
     prepared_count = 0;
     for (Cursor& cursor : cursors) cursor.reset();
+    clock::end_standing();
     const step_engine::Position position = step_engine::position();
     for (uint8_t joint = 0; joint < wire::JOINTS; ++joint) {
         queue_end.joints[joint] = {JointEnd::FOREVER, position.usteps[joint], false};
@@ -265,12 +267,7 @@ void Motion::clear() {
 }
 
 void Motion::thaw() {
-    const uint32_t stood_ticks = clock::pass_ticks() + THAW_LEAD_TICKS - frozen_ticks;
-    step_engine::shift(stood_ticks);
-    for (uint8_t i = 0; i < prepared_count; ++i) increase(prepared[i].end_ticks, stood_ticks);
-    for (Cursor& cursor : cursors) cursor.shift(stood_ticks);
-    if (!begun) increase(begin_ticks, stood_ticks);
-    slice.shift(stood_ticks);
+    clock::stand_before(frozen_ticks - THAW_LEAD_TICKS);
     frozen = starved = false;
 }
 
@@ -369,7 +366,7 @@ uint32_t Motion::tell_ledger(wire::Ledger& ledger) const {
     ledger.executed_segments = segments;
     for (uint8_t joint = 0; joint < wire::JOINTS; ++joint)
         ledger.position_usteps[joint] = position.usteps[joint];
-    return ticks;
+    return clock::device_ticks(ticks);
 }
 
 bool Motion::is_out_of_road(uint32_t& end_ticks) const {
@@ -446,7 +443,8 @@ uint8_t joint_out_of_limits() { return checked.joint_out; }
 bool commit(const uint8_t* bytes, uint8_t length) {
     uint32_t end_ticks;
     const bool out_of_road = current().is_out_of_road(end_ticks);
-    if (out_of_road && static_cast<int32_t>(end_ticks - clock::now()) < LATEST_ARRIVAL_TICKS) return false;
+    clock::begin_pass();  // the pass may have begun long ago
+    if (out_of_road && clock::ticks_until(end_ticks) < LATEST_ARRIVAL_TICKS) return false;
     queue::append(bytes, length);
     queued_path_ticks = add_saturated(queued_path_ticks, checked.path_ticks);
     queue_end = checked.end;

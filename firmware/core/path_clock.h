@@ -58,12 +58,6 @@ class Slice {
     // A time so short that begins there and lasts as long on the path, saturated.
     uint16_t stretched(uint16_t ticks, uint16_t path) const;
 
-    // The clock stood still.
-    void shift(uint32_t ticks) {
-        increase(start_ticks_, ticks);
-        increase(end_ticks_, ticks);
-    }
-
   private:
     uint32_t stretch_at(uint16_t path) const;
     uint32_t stretched_ticks_at(uint16_t path) const;

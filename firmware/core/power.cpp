@@ -69,7 +69,7 @@ void note_activity() {
 
 bool is_idle_too_long() {
     Power& at = hal::by_base(power);
-    if (clock::has_come(at.counted_ticks + TICKS_A_MS)) {
+    if (clock::pass_ticks() - at.counted_ticks >= TICKS_A_MS) {
         increase(at.counted_ticks, TICKS_A_MS);
         ++at.idle_for_ms;
     }

@@ -277,14 +277,6 @@ bool freeze(uint32_t& now_ticks) {
     return true;
 }
 
-void shift(uint32_t ticks) {
-    for (uint8_t joint = 0; joint < wire::JOINTS; ++joint) {
-        for (Run* run = step_joints[joint].active; run != rings[joint].free; run = run->next) {
-            increase(run->first_ticks, ticks);
-        }
-    }
-}
-
 Position position() {
     const Progress now = progress();
     Position total;

@@ -91,9 +91,6 @@ void drop_runs();
 // distance to that tick. False, and nothing is changed, while a step is about to rise or a pulse is high.
 bool freeze(uint32_t& now_ticks);
 
-// Moves all runs by `ticks`; all joints must be idle.
-void shift(uint32_t ticks);
-
 // Signed steps since start-up at this instant, a pulse that is still high included.
 Position position();
 

@@ -187,6 +187,21 @@ def assert_predicted_after(found: list[float], predicted: list[float]) -> None:
     assert_predicted([round(tick) for tick in found], predicted)
 
 
+def test_the_devices_clock_goes_on_while_the_motions_stands(firmware: Firmware) -> None:
+    player = Player(firmware, FAST)
+    player.start()
+    player.play_until(player.board.now + 12 * SEGMENT_TICKS)
+    before, begin = player.board.ask(), player.board.now
+    for rest_ticks in (100_000, 5_000_000):
+        player.board.receive(bytes([HOLD_CODE]))
+        player.play_until(player.board.now + 10**8, State.HELD)
+        player.board.run(rest_ticks)
+        player.board.ask(Resume())
+        status = player.play_until(player.board.now + 5 * SEGMENT_TICKS)
+        assert (status.mcu_ticks - before.mcu_ticks) % 2**32 == pytest.approx(player.board.now - begin, abs=60_000)
+    player.assert_all_steps_made()
+
+
 @settings(max_examples=15, deadline=None)
 @given(st.lists(st.integers(200_000, 4_000_000), min_size=1, max_size=6), st.integers(0, 3_000_000))
 def test_any_number_of_holds_loses_no_step(native_firmware: NativeFirmware, waits: list[int], pause: int) -> None:
