@@ -4,8 +4,10 @@
 #include "hal_pins.h"
 #include "hal_signals.h"
 #include "home.h"
+#include "intake.h"
 #include "motion.h"
 #include "power.h"
+#include "queue.h"
 #include "settings.h"
 #include "step_engine.h"
 #include "supervisor.h"
@@ -34,7 +36,7 @@ Result enable(const wire::Enable& told) {
 Result start(const wire::Start& told) {
     if (told.lead_ticks < wire::MIN_LEAD_TICKS || told.lead_ticks > wire::MAX_SEGMENT_TICKS)
         return Result::OUT_OF_RANGE;
-    if (motion::is_empty()) return Result::WRONG_STATE;
+    if (queue::is_empty()) return Result::WRONG_STATE;
     const Result result = try_event(Event::START);
     if (result != Result::OK) return result;
     const uint32_t start_ticks = clock::pass_ticks() + told.lead_ticks;
@@ -89,11 +91,12 @@ Result soft_limits(const wire::SoftLimits& told) {
 }
 
 Result set_position(const wire::SetPosition& told) {
-    if (!motion::is_empty()) return Result::WRONG_STATE;
+    if (!queue::is_empty()) return Result::WRONG_STATE;
     const Result result = try_event(Event::SET_POSITION);
     if (result != Result::OK) return result;
     for (uint8_t joint = 0; joint < wire::JOINTS; ++joint) {
-        motion::set_position(joint, told.position_usteps[joint]);
+        step_engine::set_position(joint, told.position_usteps[joint]);
+        intake::set_position(joint, told.position_usteps[joint]);
     }
     return Result::OK;
 }

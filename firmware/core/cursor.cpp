@@ -33,7 +33,7 @@ void Cursor::begin(const Move& move) {
 }
 
 bool Cursor::is_calm(const Slice& slice, uint32_t start_stop_ticks) const {
-    if (!has_step_before(slice.end_path())) return true;
+    if (!has_step_in(slice)) return true;
     uint32_t least_ticks = at_.high - last_path_ticks_;
     if (left_ > 1) {
         const uint16_t first = whole_ticks(interval_q16_);
@@ -64,7 +64,7 @@ uint8_t Cursor::guess(uint16_t path_ticks) const {
 void Cursor::find_steps(const Slice& slice, Steps& steps) const {
     const uint8_t most =
         left_ < step_engine::MAX_RUN_STEPS ? static_cast<uint8_t>(left_) : step_engine::MAX_RUN_STEPS;
-    const uint16_t path_ticks = static_cast<uint16_t>(slice.end_path() - at_.high);
+    const uint16_t path_ticks = static_cast<uint16_t>(slice.path_ticks() - at_.high);
     steps.count = slice.ends_segment() ? most : guess(path_ticks);
     if (steps.count > most) steps.count = most;
     find_last(steps);
@@ -124,7 +124,7 @@ bool Cursor::fit(const Slice& slice, const Steps& steps, uint16_t first_path, Ru
 bool Cursor::take(const Slice& slice, Run& run) {
     Steps steps;
     find_steps(slice, steps);
-    const uint16_t first_path = slice.path_of(at_.high);
+    const uint16_t first_path = static_cast<uint16_t>(at_.high);
     run.positive = positive_;
     run.fraction = at_.low;
     run.interval_q16 = interval_q16_;
@@ -160,6 +160,9 @@ void Cursor::advance(const Steps& steps) {
     interval_q16_ = steps.interval_q16 + add_q16_;
 }
 
-void Cursor::finish(uint32_t segment_ticks) { last_path_ticks_ -= segment_ticks; }
+void Cursor::finish(const Slice& slice) {
+    at_.high -= slice.path_ticks();
+    last_path_ticks_ -= slice.path_ticks();
+}
 
 }  // namespace planarm

@@ -18,18 +18,20 @@ class Cursor {
     // Takes the joint's steps of the next segment.
     void begin(const Move& move);
 
-    // True when a step is left before a path time of the segment.
-    bool has_step_before(uint32_t path_ticks) const { return left_ != 0 && at_.high < path_ticks; }
+    // True when a step is left in a slice.
+    bool has_step_in(const path_clock::Slice& slice) const {
+        return left_ != 0 && at_.high < slice.path_ticks();
+    }
 
     // True when the joint is slower than its start-stop speed all over a slice that was not begun yet.
     bool is_calm(const path_clock::Slice& slice, uint32_t start_stop_ticks) const;
 
-    // Makes a run of the next steps in a slice of the segment; has_step_before its end must hold. True when
+    // Makes a run of the next steps in a slice of the segment; has_step_in must hold. True when
     // it is close enough to the step before for the step interrupt to go on by itself.
     bool take(const path_clock::Slice& slice, Run& run);
 
-    // The segment lasts so long.
-    void finish(uint32_t segment_ticks);
+    // Nothing is left in the slice: another one follows.
+    void finish(const path_clock::Slice& slice);
 
   private:
     // The next steps of a slice. Times are in 2^-16 ticks from the tick of the first of them, modulo 2^32:
@@ -46,13 +48,13 @@ class Cursor {
     bool fit(const path_clock::Slice& slice, const Steps& steps, uint16_t first_path, Run& run) const;
     void advance(const Steps& steps);
 
-    Fixed48 at_;  // path time of the next step, from the segment's start
+    Fixed48 at_;  // path time of the next step, from the slice's start
     uint32_t interval_q16_;
     uint32_t add_q16_;  // modulo 2^32
     uint16_t left_;
     uint8_t guess_;  // steps of the segment's slice before; 0: none yet
     bool positive_;
-    uint32_t last_path_ticks_;  // path time of the last step, from the segment's start, modulo 2^32
+    uint32_t last_path_ticks_;  // path time of the last step, from the slice's start, modulo 2^32
     uint32_t last_ticks_;       // its tick
 };
 

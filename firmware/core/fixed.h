@@ -20,10 +20,4 @@ void increase(uint32_t& value, uint32_t by);
 
 inline Fixed48 from_q16(uint32_t value) { return {value >> 16, static_cast<uint16_t>(value)}; }
 
-// 2^32 - 1 when the sum does not fit.
-inline uint32_t add_saturated(uint32_t a, uint32_t b) {
-    const uint32_t sum = a + b;
-    return sum < a ? 0xFFFFFFFF : sum;
-}
-
 }  // namespace planarm

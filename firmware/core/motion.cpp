@@ -3,6 +3,7 @@
 #include "clock.h"
 #include "cursor.h"
 #include "hal_base.h"
+#include "intake.h"
 #include "path_clock.h"
 #include "queue.h"
 #include "segment.h"
@@ -32,29 +33,11 @@ constexpr uint32_t THAW_LEAD_TICKS = 16000;
 // A payload that still fits means that more can come.
 constexpr uint16_t FULL_BYTES = wire::MAX_PAYLOAD_BYTES;
 
+// In units of a need.
+constexpr uint8_t STARVING_MARGIN = wire::STARVING_TICKS / wire::NEED_UNIT_TICKS;
+static_assert(wire::STARVING_TICKS % wire::NEED_UNIT_TICKS == 0, "whole units");
+
 constexpr uint8_t MAX_SLICES = 4;
-
-// -- what is queued --
-
-uint32_t queued_path_ticks;  // of all segments not yet begun, saturated
-// What the segments after the last queued one go on from.
-struct QueueEnd {
-    JointEnd joints[wire::JOINTS];
-    bool complete;  // the motion's last segment is queued
-};
-
-QueueEnd queue_end;
-
-struct Check {
-    Reader reader;
-    uint32_t path_ticks;
-    QueueEnd end;
-    uint8_t joint_out;
-};
-
-Check checked;
-
-// -- what is being worked off --
 
 // Slices handed over and not yet executed, oldest first.
 struct Prepared {
@@ -83,11 +66,11 @@ class Motion {
     void halt();
     uint32_t tell_ledger(wire::Ledger& ledger) const;
 
-    // True when a motion goes on and has nothing left to do but what is prepared, with when that ends.
-    bool is_out_of_road(uint32_t& end_ticks) const;
+    bool is_too_late() const;
 
   private:
-    bool is_starving(uint32_t path_ticks, uint32_t margin_ticks) const;
+    bool is_in_segment() const { return filling || left_ticks != 0; }
+    bool is_starving(uint8_t margin) const;
     void read_next_segment();
     void open_slice();
     bool fill_slice();
@@ -113,11 +96,10 @@ class Motion {
     bool reading;  // a payload
     uint32_t slow_value;
     uint32_t fast_value;
-    uint32_t need_ticks;
+    uint8_t need;  // in NEED_UNIT_TICKS
 
-    bool in_segment;
     bool segment_last;
-    uint32_t segment_ticks;
+    uint32_t left_ticks;   // of the segment, in no slice yet
     uint16_t slice_ticks;  // of its slices but the last
 
     bool filling;  // a slice
@@ -131,11 +113,12 @@ Motion motion;
 
 Motion& current() { return hal::by_base(motion); }
 
-// True when the path that is left after `path_ticks` of the segment is too short to rest on.
-bool Motion::is_starving(uint32_t path_ticks, uint32_t margin_ticks) const {
-    if (queue_end.complete || segment_last || queue::free_bytes() < FULL_BYTES) return false;
-    const uint32_t rest_of_segment = in_segment ? segment_ticks - path_ticks : 0;
-    return add_saturated(queued_path_ticks, rest_of_segment) < need_ticks + margin_ticks;
+// True when the path that is left after the slice is too short to rest on, and `margin` of NEED_UNIT_TICKS
+// more.
+bool Motion::is_starving(uint8_t margin) const {
+    if (intake::is_complete() || segment_last || queue::free_bytes() < FULL_BYTES) return false;
+    const uint32_t road_ticks = intake::path_ticks() + left_ticks;
+    return road_ticks / wire::NEED_UNIT_TICKS < static_cast<uint16_t>(need + margin);
 }
 
 // Apart from serve, whose frame on the stack lies below the deepest calls.
@@ -145,7 +128,7 @@ bool Motion::is_starving(uint32_t path_ticks, uint32_t margin_ticks) const {
         queue::read_front(payload);
         slow_value = path_clock::rate_value(payload.u8());
         fast_value = path_clock::rate_value(payload.u8());
-        need_ticks = static_cast<uint32_t>(payload.u8()) * wire::NEED_UNIT_TICKS;
+        need = payload.u8();
         reading = true;
     }
     SegmentHead head;
@@ -159,17 +142,11 @@ bool Motion::is_starving(uint32_t path_ticks, uint32_t margin_ticks) const {
         queue::release();
         reading = false;
     }
-    segment_ticks = head.duration_ticks;
-    slice_ticks = static_cast<uint16_t>(segment_ticks);
-    if (segment_ticks > wire::SLICE_TICKS) {
-        const uint32_t slices = (segment_ticks - 1) / wire::SLICE_TICKS + 1;
-        slice_ticks = static_cast<uint16_t>((segment_ticks - 1) / slices + 1);
-    }
+    left_ticks = head.duration_ticks;
+    const uint32_t slices = (left_ticks - 1) / wire::SLICE_TICKS + 1;
+    slice_ticks = static_cast<uint16_t>((left_ticks - 1) / slices + 1);
     segment_last = head.last;
-    if (queued_path_ticks != 0xFFFFFFFF) queued_path_ticks -= segment_ticks;
-    if (queue::is_empty()) queued_path_ticks = 0;
-    slice.begin_segment();
-    in_segment = true;
+    intake::begin_segment(left_ticks);
 }
 
 bool is_calm() {
@@ -180,12 +157,11 @@ bool is_calm() {
 }
 
 [[gnu::noinline]] void Motion::open_slice() {
-    const uint32_t left_ticks = segment_ticks - slice.end_path();
     path_clock::Way way;
     way.ends_segment = left_ticks <= slice_ticks;
     way.path_ticks = way.ends_segment ? static_cast<uint16_t>(left_ticks) : slice_ticks;
-    const bool quickly =
-        wish == Wish::REST_QUICKLY || is_starving(slice.end_path() + way.path_ticks, wire::STARVING_TICKS);
+    left_ticks -= way.path_ticks;
+    const bool quickly = wish == Wish::REST_QUICKLY || is_starving(STARVING_MARGIN);
     way.target = quickly || wish == Wish::REST ? path_clock::MAX_STRETCH : override_stretch;
     way.rate = way.target > slice.end_stretch() ? slow_value : fast_value;
     if (!quickly) way.rate >>= 1;
@@ -206,27 +182,24 @@ bool Motion::fill_slice() {
     for (uint8_t i = 0; i < wire::JOINTS; ++i) {
         joint = joint == wire::JOINTS - 1 ? 0 : static_cast<uint8_t>(joint + 1);
         Cursor& cursor = cursors[joint];
-        if (!cursor.has_step_before(slice.end_path())) continue;
+        if (!cursor.has_step_in(slice)) continue;
         if ((!urgent || slice.is_plain()) && step_engine::has_room(joint)) {
             step_engine::append(joint, cursor.take(slice, step_engine::next_run(joint)));
             urgent = true;
             turn = joint;
         }
-        more = more || cursor.has_step_before(slice.end_path());
+        more = more || cursor.has_step_in(slice);
     }
     if (more) return false;
-    if (slice.ends_segment()) {
-        for (Cursor& cursor : cursors) cursor.finish(segment_ticks);
-        in_segment = false;
-    }
+    for (Cursor& cursor : cursors) cursor.finish(slice);
     return true;
 }
 
 void Motion::prepare() {
     urgent = false;
     if (!filling) {
-        if (!in_segment) read_next_segment();  // as a rule ahead of time
-        if (!in_segment) return;
+        if (left_ticks == 0) read_next_segment();  // as a rule ahead of time
+        if (left_ticks == 0) return;
         const int32_t away_ticks = clock::ticks_until(slice.end_ticks());
         if (prepared_count == MAX_SLICES || away_ticks > PREPARE_AHEAD_TICKS) return;
         open_slice();
@@ -244,26 +217,22 @@ bool Motion::retire(bool& ends_motion) {
         ends_motion = prepared[0].ends_motion;
         --prepared_count;
         for (uint8_t i = 0; i < prepared_count; ++i) prepared[i] = prepared[i + 1];
-        if (prepared_count == 0 && !in_segment && queue::is_empty()) return true;
+        if (prepared_count == 0 && !is_in_segment() && queue::is_empty()) return true;
     }
     return false;
 }
 
 void Motion::clear() {
     queue::clear();
-    queued_path_ticks = 0;
-    need_ticks = 0;  // a motion does not starve by the last one's need before it has read its own
-    queue_end.complete = false;
-    running = begun = reading = in_segment = segment_last = filling = frozen = starved = false;
+    intake::reset(step_engine::position().usteps);
+    left_ticks = 0;
+    need = 0;  // a motion does not starve by the last one's need before it has read its own
+    running = begun = reading = segment_last = filling = frozen = starved = false;
     wish = Wish::GO;
     slice.begin_with(override_stretch);
     prepared_count = 0;
     for (Cursor& cursor : cursors) cursor.reset();
     clock::end_standing();
-    const step_engine::Position position = step_engine::position();
-    for (uint8_t joint = 0; joint < wire::JOINTS; ++joint) {
-        queue_end.joints[joint] = {JointEnd::FOREVER, position.usteps[joint], false};
-    }
 }
 
 void Motion::thaw() {
@@ -283,14 +252,14 @@ bool Motion::may_freeze() const {
         starved = false;
         return Progress::AT_REST;
     }
-    if (starved && is_starving(slice.end_path(), 2 * wire::STARVING_TICKS)) return Progress::GOING;
+    if (starved && is_starving(2 * STARVING_MARGIN)) return Progress::GOING;
     const bool was_starved = starved;
     thaw();
     return was_starved ? Progress::FED : Progress::GOING;
 }
 
 [[gnu::noinline]] Progress Motion::freeze_if_due() {
-    const bool starving = wish == Wish::GO && is_starving(slice.end_path(), wire::STARVING_TICKS);
+    const bool starving = wish == Wish::GO && is_starving(STARVING_MARGIN);
     if (wish == Wish::GO && !starving) return Progress::GOING;
     if (!may_freeze() || !step_engine::freeze(frozen_ticks)) return Progress::GOING;
     clock::begin_pass_at(frozen_ticks);
@@ -369,9 +338,10 @@ uint32_t Motion::tell_ledger(wire::Ledger& ledger) const {
     return clock::device_ticks(ticks);
 }
 
-bool Motion::is_out_of_road(uint32_t& end_ticks) const {
-    end_ticks = slice.end_ticks();
-    return running && !frozen && !in_segment && queue::is_empty();
+bool Motion::is_too_late() const {
+    clock::begin_pass();  // the pass may have begun long ago
+    return running && !frozen && !is_in_segment() && queue::is_empty() &&
+           clock::ticks_until(slice.end_ticks()) < LATEST_ARRIVAL_TICKS;
 }
 
 }  // namespace
@@ -394,73 +364,9 @@ void halt() { current().halt(); }
 
 uint32_t tell_ledger(wire::Ledger& ledger) { return current().tell_ledger(ledger); }
 
-namespace {
-
-bool is_out_of_limits(uint8_t joint, int32_t usteps) {
-    const int32_t least_usteps = settings::soft_limits.least_usteps[joint];
-    const int32_t most_usteps = settings::soft_limits.most_usteps[joint];
-    return least_usteps <= most_usteps && (usteps < least_usteps || usteps > most_usteps);
-}
-
-}  // namespace
-
-wire::Result begin_check(const uint8_t* bytes, uint8_t length) {
-    if (queue_end.complete) return wire::Result::WRONG_STATE;
-    if (length > queue::free_bytes()) return wire::Result::BUSY;
-    Check& at = hal::by_base(checked);
-    at.reader.begin(bytes, length);
-    for (uint8_t i = 0; i < 3; ++i) at.reader.u8();
-    at.path_ticks = 0;
-    at.end = queue_end;
-    at.joint_out = wire::JOINTS;
-    return at.reader.ok() && !at.reader.at_end() ? wire::Result::OK : wire::Result::MALFORMED;
-}
-
-wire::Result check_next() {
-    Check& at = hal::by_base(checked);
-    if (at.end.complete) return wire::Result::WRONG_STATE;
-    SegmentHead head;
-    read_head(at.reader, head);
-    bool good = head.duration_ticks != 0 && head.duration_ticks <= wire::MAX_SEGMENT_TICKS;
-    for (uint8_t joint = 0; joint < wire::JOINTS; ++joint) {
-        Move move;
-        read_move(at.reader, move);
-        JointEnd& end = at.end.joints[joint];
-        good = good && check_move(move, head.duration_ticks, end);
-        if (move.steps != 0 && is_out_of_limits(joint, end.usteps)) at.joint_out = joint;
-    }
-    if (!at.reader.ok()) return wire::Result::MALFORMED;
-    if (!good) return wire::Result::OUT_OF_RANGE;
-    at.path_ticks = add_saturated(at.path_ticks, head.duration_ticks);
-    at.end.complete = head.last;
-    return wire::Result::OK;
-}
-
-bool is_checked() { return checked.reader.at_end(); }
-
-uint8_t joint_out_of_limits() { return checked.joint_out; }
-
-bool commit(const uint8_t* bytes, uint8_t length) {
-    uint32_t end_ticks;
-    const bool out_of_road = current().is_out_of_road(end_ticks);
-    clock::begin_pass();  // the pass may have begun long ago
-    if (out_of_road && clock::ticks_until(end_ticks) < LATEST_ARRIVAL_TICKS) return false;
-    queue::append(bytes, length);
-    queued_path_ticks = add_saturated(queued_path_ticks, checked.path_ticks);
-    queue_end = checked.end;
-    return true;
-}
-
-bool is_empty() { return queue::is_empty(); }
-
 bool is_urgent() { return current().is_urgent(); }
 
-uint16_t free_bytes() { return queue::free_bytes(); }
-
-void set_position(uint8_t joint, int32_t usteps) {
-    step_engine::set_position(joint, usteps);
-    queue_end.joints[joint].usteps = usteps;
-}
+bool is_too_late() { return current().is_too_late(); }
 
 }  // namespace motion
 }  // namespace planarm

@@ -10,7 +10,6 @@
 #include <stdint.h>
 
 #include "messages.h"
-#include "reader.h"
 
 namespace planarm {
 namespace motion {
@@ -31,22 +30,11 @@ enum class Wish : uint8_t { GO, REST, REST_QUICKLY };
 // Empty queue, ledger 0, defaults. For start-up, before interrupts are on.
 void reset();
 
-// Begins to check a SEGMENTS payload. OK, BUSY (no room), MALFORMED, or WRONG_STATE after the motion's last.
-wire::Result begin_check(const uint8_t* payload, uint8_t length);
-// Checks its next segment. OK, MALFORMED, OUT_OF_RANGE, or WRONG_STATE after the motion's last.
-wire::Result check_next();
-// True when all of them are checked.
-bool is_checked();
-// The joint that a checked segment takes out of its soft limits, or wire::JOINTS.
-uint8_t joint_out_of_limits();
-// Queues the payload. When it comes too late for a motion that has nothing else left to do, it does not and
-// returns false: the motion then ends in an underrun, after the last step that came in time.
-bool commit(const uint8_t* payload, uint8_t length);
-
-bool is_empty();
 // True when the next call of serve should not wait for other work.
 bool is_urgent();
-uint16_t free_bytes();
+// True when a motion has nothing left to do, and so soon an end that what is queued now would come too late:
+// it then ends in an underrun, after the last step that came in time.
+bool is_too_late();
 
 // The first queued segment starts at `start_ticks`.
 void start(uint32_t start_ticks);
@@ -65,8 +53,6 @@ void halt();
 
 // Tells the ledger as it is at the moment returned, in ticks.
 uint32_t tell_ledger(wire::Ledger& ledger);
-// For an arm at rest.
-void set_position(uint8_t joint, int32_t usteps);
 
 }  // namespace motion
 }  // namespace planarm

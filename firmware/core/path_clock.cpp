@@ -56,8 +56,7 @@ uint32_t stretch_after(uint32_t stretch, const Way& way) {
 }
 
 void Slice::follow(const Way& way) {
-    from_path_ = static_cast<uint16_t>(end_path_);
-    increase(end_path_, way.path_ticks);
+    path_ticks_ = way.path_ticks;
     start_ticks_ = end_ticks_;
     ends_segment_ = way.ends_segment;
     s0_ = s1_;

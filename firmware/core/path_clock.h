@@ -40,20 +40,17 @@ class Slice {
     // The next slice begins at this tick, with this stretch.
     void begin_at(uint32_t ticks) { end_ticks_ = ticks; }
     void begin_with(uint32_t stretch) { s1_ = stretch; }
-    void begin_segment() { end_path_ = 0; }
 
     void follow(const Way& way);
 
     bool is_plain() const { return plain_; }  // at a stretch of 1
     bool ends_segment() const { return ends_segment_; }
-    uint32_t end_path() const { return end_path_; }  // in its segment
+    uint16_t path_ticks() const { return path_ticks_; }
     uint32_t end_ticks() const { return end_ticks_; }
     uint32_t end_stretch() const { return s1_; }
     uint32_t least_stretch() const { return s0_ < s1_ ? s0_ : s1_; }
 
-    // Path time since the slice's start of a path time of the segment, before the slice's end.
-    uint16_t path_of(uint32_t path) const { return static_cast<uint16_t>(path - from_path_); }
-    // The tick of such a path time.
+    // The tick of a path time since the slice's start.
     uint32_t ticks_at(uint16_t path) const { return plain_ ? start_ticks_ + path : stretched_ticks_at(path); }
     // A time so short that begins there and lasts as long on the path, saturated.
     uint16_t stretched(uint16_t ticks, uint16_t path) const;
@@ -64,11 +61,10 @@ class Slice {
 
     uint32_t start_ticks_;
     uint32_t end_ticks_;
-    uint32_t end_path_;
     uint32_t s0_;
     uint32_t s1_;
     uint32_t reciprocal_;  // 2^32 / path ticks
-    uint16_t from_path_;
+    uint16_t path_ticks_;
     bool plain_;
     bool ends_segment_;
 };

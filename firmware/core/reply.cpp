@@ -5,6 +5,7 @@
 #include "hal_signals.h"
 #include "inputs.h"
 #include "motion.h"
+#include "queue.h"
 #include "supervisor.h"
 #include "version.h"
 
@@ -72,7 +73,7 @@ void send_status(const session::Report& report) {
     told.detail = supervisor::fault_detail();
     told.refusal = report.refusal;
     told.refusal_seq = report.refusal_seq;
-    told.free_bytes = motion::free_bytes();
+    told.free_bytes = queue::free_bytes();
     told.crc_errors = report.crc_errors;
     told.overruns = hal::serial_overruns();
     told.ring_full = hal::serial_ring_full();

@@ -60,9 +60,15 @@ void read_move(Reader& reader, Move& move) {
     move.add_q16 = reader.varint();
 }
 
+// A rest that is so much longer; what does not fit is FOREVER. `ticks` are less than 2^31.
+uint16_t longer_rest(uint16_t rest_ticks, uint32_t ticks) {
+    ticks += rest_ticks;
+    return ticks < JointEnd::FOREVER ? static_cast<uint16_t>(ticks) : JointEnd::FOREVER;
+}
+
 bool check_move(const Move& move, uint32_t duration_ticks, JointEnd& end) {
     if (move.steps == 0) {
-        end.rest_ticks = add_saturated(end.rest_ticks, duration_ticks);
+        end.rest_ticks = longer_rest(end.rest_ticks, duration_ticks);
         return true;
     }
     uint32_t last_ticks;
@@ -74,8 +80,8 @@ bool check_move(const Move& move, uint32_t duration_ticks, JointEnd& end) {
 
     const uint16_t least_ticks =
         move.positive == end.positive ? wire::MIN_INTERVAL_TICKS : MIN_REVERSAL_TICKS;
-    if (add_saturated(end.rest_ticks, move.first_ticks) < least_ticks) return false;
-    end.rest_ticks = duration_ticks - last_ticks;
+    if (longer_rest(end.rest_ticks, move.first_ticks) < least_ticks) return false;
+    end.rest_ticks = longer_rest(0, duration_ticks - last_ticks);
     end.positive = move.positive;
     const uint32_t steps = move.steps;
     end.usteps =

@@ -18,6 +18,9 @@ struct Move {
     bool positive;
 };
 
+// Of a SEGMENTS payload, before its segments: slow, fast and need.
+constexpr uint8_t SEGMENTS_HEAD_BYTES = wire::SEGMENTS_MIN_BYTES - 1 - wire::JOINTS;
+
 struct SegmentHead {
     uint32_t duration_ticks;
     bool last;
@@ -25,8 +28,8 @@ struct SegmentHead {
 
 // Where a joint is at the end of the queue.
 struct JointEnd {
-    static constexpr uint32_t FOREVER = 0xFFFFFFFF;
-    uint32_t rest_ticks;  // since its last step, saturated; FOREVER when it has not moved yet
+    static constexpr uint16_t FOREVER = 0xFFFF;
+    uint16_t rest_ticks;  // since its last step, saturated; FOREVER when it has not moved yet
     int32_t usteps;
     bool positive;  // the direction of that step
 };

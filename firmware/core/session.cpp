@@ -1,6 +1,7 @@
 #include "session.h"
 
 #include "commands.h"
+#include "intake.h"
 #include "motion.h"
 #include "reply.h"
 #include "supervisor.h"
@@ -64,26 +65,30 @@ Result refuse(Result result) {
 bool next_segment(Result& result) {
     result = Result::WRONG_STATE;
     if (!supervisor::allows(Event::SEGMENTS)) return true;
-    result = motion::check_next();
+    result = intake::check_next();
     if (result != Result::OK) {
         refuse(result);
         return true;
     }
-    const uint8_t joint_out = motion::joint_out_of_limits();
+    const uint8_t joint_out = intake::joint_out_of_limits();
     if (joint_out != wire::JOINTS) {
         supervisor::fail(Fault::SOFT_LIMIT, joint_out);
         result = Result::OUT_OF_RANGE;
         return true;
     }
-    if (!motion::is_checked()) return false;
-    if (!motion::commit(checking->payload, checking->length)) result = Result::WRONG_STATE;
+    if (!intake::is_checked()) return false;
+    if (motion::is_too_late()) {
+        result = Result::WRONG_STATE;
+    } else {
+        intake::commit(checking->payload, checking->length);
+    }
     return true;
 }
 
 // Begins with a SEGMENTS frame: what can be told of it as a whole.
 void begin_segments(const Frame& frame) {
     if (!supervisor::allows(Event::SEGMENTS)) return finish(Result::WRONG_STATE);
-    const Result result = motion::begin_check(frame.payload, frame.length);
+    const Result result = intake::begin_check(frame.payload, frame.length);
     if (result == Result::BUSY) return finish(result);
     if (result != Result::OK) return finish(refuse(result));
     checking = &frame;
