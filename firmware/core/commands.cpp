@@ -1,6 +1,7 @@
 #include "commands.h"
 
 #include "clock.h"
+#include "hal_flash.h"
 #include "hal_pins.h"
 #include "hal_signals.h"
 #include "home.h"
@@ -49,11 +50,6 @@ Result clear() {
     const Result result = try_event(supervisor::clear_event());
     if (result == Result::OK) hal::emergency_clear();
     return result;
-}
-
-Result resume() {
-    supervisor::apply(Event::RESUME);
-    return Result::OK;
 }
 
 Result stop(const wire::Stop& told) {
@@ -109,45 +105,50 @@ Result begin_home(const wire::Home& told) {
     return result;
 }
 
-template <typename Message>
-Result run(Result (*carry_out)(const Message&), const Frame& frame) {
-    return frame.length == sizeof(Message) ? carry_out(frame.as<Message>()) : Result::MALFORMED;
-}
-
-Result run(Result (*carry_out)(), const Frame& frame) {
-    return frame.length == 0 ? carry_out() : Result::MALFORMED;
-}
-
-Result query() { return Result::OK; }
+// Bytes of the payloads, from QUERY on. SEGMENTS, which is no command, has a length that none has.
+const uint16_t LENGTHS[] HAL_FLASH = {
+    wire::QUERY_BYTES,       wire::ENABLE_BYTES, 0xFF,
+    wire::START_BYTES,       wire::CLEAR_BYTES,  wire::RESUME_BYTES,
+    wire::OVERRIDE_BYTES,    wire::STOP_BYTES,   wire::CONFIG_BYTES,
+    wire::SOFT_LIMITS_BYTES, wire::HOME_BYTES,   wire::SET_POSITION_BYTES,
+};
+constexpr uint8_t COMMANDS = sizeof(LENGTHS) / sizeof(LENGTHS[0]);
+constexpr uint8_t FIRST = static_cast<uint8_t>(MessageType::QUERY);
+static_assert(static_cast<uint8_t>(MessageType::SEGMENTS) == FIRST + 2 &&
+                  static_cast<uint8_t>(MessageType::OVERRIDE) == FIRST + 6 &&
+                  static_cast<uint8_t>(MessageType::SET_POSITION) == FIRST + COMMANDS - 1,
+              "the order of the lengths");
 
 }  // namespace
 
 Result execute(const Frame& frame) {
+    const uint8_t number = static_cast<uint8_t>(frame.type - FIRST);
+    if (number >= COMMANDS) return Result::UNKNOWN_TYPE;
+    if (hal::flash_word(&LENGTHS[number]) != frame.length) return Result::MALFORMED;
     switch (static_cast<MessageType>(frame.type)) {
-        case MessageType::QUERY:
-            return run(query, frame);
         case MessageType::ENABLE:
-            return run(enable, frame);
+            return enable(frame.as<wire::Enable>());
         case MessageType::START:
-            return run(start, frame);
+            return start(frame.as<wire::Start>());
         case MessageType::CLEAR:
-            return run(clear, frame);
+            return clear();
         case MessageType::RESUME:
-            return run(resume, frame);
+            supervisor::apply(Event::RESUME);
+            return Result::OK;
         case MessageType::STOP:
-            return run(stop, frame);
+            return stop(frame.as<wire::Stop>());
         case MessageType::OVERRIDE:
-            return run(set_override, frame);
+            return set_override(frame.as<wire::Override>());
         case MessageType::CONFIG:
-            return run(config, frame);
+            return config(frame.as<wire::Config>());
         case MessageType::SOFT_LIMITS:
-            return run(soft_limits, frame);
+            return soft_limits(frame.as<wire::SoftLimits>());
         case MessageType::SET_POSITION:
-            return run(set_position, frame);
+            return set_position(frame.as<wire::SetPosition>());
         case MessageType::HOME:
-            return run(begin_home, frame);
+            return begin_home(frame.as<wire::Home>());
         default:
-            return Result::UNKNOWN_TYPE;
+            return Result::OK;  // QUERY
     }
 }
 

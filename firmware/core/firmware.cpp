@@ -33,10 +33,8 @@ uint8_t passes;
 // Spreads counts that follow each other over all 32 bits; every step can be undone, so different counts stay
 // different. The multiplier is 2^32 over the golden ratio, made odd.
 uint32_t mix(uint32_t count) {
-    uint32_t mixed = (count + 1) * 0x9E3779B1u;
-    mixed ^= mixed >> 15;
-    mixed *= 0x9E3779B1u;
-    return mixed ^ (mixed >> 13);
+    const uint32_t mixed = (count + 1) * 0x9E3779B1u;
+    return mixed ^ (mixed >> 16);
 }
 
 void tell(supervisor::Event event) {

@@ -42,8 +42,10 @@ bool is_out_of_limits(uint8_t joint, int32_t usteps) {
 
 }  // namespace
 
-void reset(const int32_t* position_usteps) {
-    for (JointEnd& end : queue_end.joints) end = {JointEnd::FOREVER, *position_usteps++, false};
+void reset(const wire::Ledger& ledger) {
+    for (uint8_t joint = 0; joint < wire::JOINTS; ++joint) {
+        queue_end.joints[joint] = {JointEnd::FOREVER, ledger.position_usteps[joint], false};
+    }
     queue_end.complete = false;
     queued_path_ticks = 0;
 }

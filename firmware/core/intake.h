@@ -9,7 +9,7 @@ namespace planarm {
 namespace intake {
 
 // Begins anew, with an empty queue: joints that have not moved yet, where they are.
-void reset(const int32_t* position_usteps);
+void reset(const wire::Ledger& ledger);
 // For an arm at rest.
 void set_position(uint8_t joint, int32_t usteps);
 

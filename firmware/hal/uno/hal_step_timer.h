@@ -292,16 +292,6 @@ inline void wait_step_high() {
     __asm__ __volatile__("1: dec %0\n\tbrne 1b" : "+r"(turns));
 }
 
-// Lets pulses that are high fall while nothing is armed, by themselves: at once, or with a second match after
-// their least high time.
-HAL_INLINE void fall_soon() {
-    if (SECOND_MATCH) {
-        OCR1A = OCR1B = static_cast<uint16_t>(TCNT1 + planarm::wire::MIN_STEP_HIGH_TICKS);
-    } else {
-        TCCR1C = _BV(FOC1A) | _BV(FOC1B);
-    }
-}
-
 template <uint8_t JOINT>
 HAL_INLINE bool dir_is(bool positive) {
     return written_pin(planarm::wire::DIR_PINS[JOINT]) == positive;

@@ -4,6 +4,7 @@
 #include <avr/io.h>
 #include <util/crc16.h>
 
+#include "hal_base.h"
 #include "hal_journal.h"
 #include "hal_step_timer.h"
 #include "polarity.h"
@@ -13,18 +14,26 @@ namespace hal {
 namespace {
 
 constexpr uint8_t RECORDS = 128;
-constexpr uint8_t RECORD_BYTES = 4;
-constexpr uint8_t CHECK_START = 0x5A;  // neither an erased nor a cleared EEPROM passes the check
-constexpr uint32_t SEQUENCE_MASK = 0x7FFFFF;
+constexpr uint8_t CHECK_START = 0xA6;  // neither an erased nor a cleared EEPROM passes the check
 
-uint32_t sequence;
-uint8_t slot;  // of the newest record
-uint8_t record[RECORD_BYTES];
-uint8_t unwritten;  // bytes of the newest record
+struct Record {
+    __uint24 mark;  // its number, modulo 2^23, and in the lowest bit whether the drivers are enabled
+    uint8_t check;
+};
+
+struct Newest {
+    Record record;
+    uint8_t slot;
+    uint8_t unwritten;  // bytes
+};
+
+Newest newest;
+
+uint8_t* bytes_of(Record& of) { return reinterpret_cast<uint8_t*>(&of); }
 
 bool is_ready() { return (EECR & _BV(EEPE)) == 0; }
 
-uint8_t read_byte(uint16_t address) {
+[[gnu::noinline]] uint8_t read_byte(uint16_t address) {
     while (!is_ready()) {
     }
     EEAR = address;
@@ -41,72 +50,61 @@ void write_byte(uint16_t address, uint8_t value) {
     EECR |= _BV(EEPE);
 }
 
-uint8_t check_of(const uint8_t* bytes) {
+[[gnu::noinline]] uint8_t check_of(Record& of) {
     uint8_t check = CHECK_START;
-    for (uint8_t i = 0; i < RECORD_BYTES - 1; ++i) check = _crc8_ccitt_update(check, bytes[i]);
+    for (uint8_t i = 0; i < sizeof(of.mark); ++i) check = _crc8_ccitt_update(check, bytes_of(of)[i]);
     return check;
 }
 
-// False when the record does not pass its check.
-bool read_record(uint8_t index, uint32_t& told_sequence, bool& enabled) {
-    uint8_t bytes[RECORD_BYTES];
-    for (uint8_t i = 0; i < RECORD_BYTES; ++i) {
-        bytes[i] = read_byte(static_cast<uint16_t>(index * RECORD_BYTES + i));
-    }
-    const uint16_t low = static_cast<uint16_t>(bytes[0] | (bytes[1] << 8));
-    told_sequence = low | (static_cast<uint32_t>(bytes[2] & 0x7F) << 16);
-    enabled = (bytes[2] & 0x80) != 0;
-    return bytes[RECORD_BYTES - 1] == check_of(bytes);
-}
-
-// The newest is the one that the others are behind of, modulo 2^23.
-bool find_newest() {
+// The newest is the one that the others are behind of, modulo 2^24.
+void find_newest(Newest& at) {
     bool found = false;
-    bool was_enabled = false;
+    uint16_t address = 0;
     for (uint8_t index = 0; index < RECORDS; ++index) {
-        uint32_t candidate;
-        bool enabled;
-        if (!read_record(index, candidate, enabled)) continue;
-        const uint32_t ahead = (candidate - sequence) & SEQUENCE_MASK;
-        if (found && (ahead == 0 || ahead > SEQUENCE_MASK / 2)) continue;
+        Record read;
+        for (uint8_t i = 0; i < sizeof(read); ++i) bytes_of(read)[i] = read_byte(address++);
+        if (read.check != check_of(read)) continue;
+        if (found && static_cast<__int24>(read.mark - at.record.mark) <= 0) continue;
         found = true;
-        sequence = candidate;
-        slot = index;
-        was_enabled = enabled;
+        at.record = read;
+        at.slot = index;
     }
-    return was_enabled;
 }
 
 // A record that is still being written is written anew in its place: a mark never waits for another.
 void begin_record(bool enabled) {
-    if (unwritten == 0) {
-        sequence = (sequence + 1) & SEQUENCE_MASK;
-        slot = static_cast<uint8_t>((slot + 1) % RECORDS);
+    Newest& at = by_base(newest);
+    if (at.unwritten == 0) {
+        at.record.mark += 2;
+        at.slot = static_cast<uint8_t>((at.slot + 1) % RECORDS);
     }
-    record[0] = static_cast<uint8_t>(sequence);
-    record[1] = static_cast<uint8_t>(sequence >> 8);
-    record[2] = static_cast<uint8_t>((sequence >> 16) | (enabled ? 0x80 : 0));
-    record[3] = check_of(record);
-    unwritten = RECORD_BYTES;
+    at.record.mark &= ~static_cast<__uint24>(1);
+    if (enabled) at.record.mark |= 1;
+    at.record.check = check_of(at.record);
+    at.unwritten = sizeof(at.record);
 }
 
 }  // namespace
 
 JournalBoot journal_boot() {
-    const bool was_enabled = find_newest();
+    Newest& at = by_base(newest);
+    find_newest(at);
+    const bool was_enabled = (at.record.mark & 1) != 0;
     begin_record(false);
-    while (unwritten != 0) journal_serve();
+    while (at.unwritten != 0) journal_serve();
     while (!is_ready()) {
     }
-    return {sequence, was_enabled};
+    return {at.record.mark, was_enabled};
 }
 
 void journal_mark(bool enabled) { begin_record(enabled); }
 
 void journal_serve() {
-    if (unwritten == 0 || !is_ready()) return;
-    --unwritten;
-    write_byte(static_cast<uint16_t>(slot * RECORD_BYTES + unwritten), record[unwritten]);
+    Newest& at = by_base(newest);
+    if (at.unwritten == 0 || !is_ready()) return;
+    --at.unwritten;
+    write_byte(static_cast<uint16_t>(at.slot * sizeof(at.record) + at.unwritten),
+               bytes_of(at.record)[at.unwritten]);
 }
 
 void keep_enable_polarity(bool active_high) {

@@ -15,9 +15,11 @@ namespace {
 
 using planarm::wire::Reset;
 
-// Memory holds these after a start of this firmware, and by chance only after power-on.
+// Memory holds these after a start of this firmware, and by chance only after power-on. They differ in the
+// first byte.
 constexpr uint32_t RUNNING = 0x706C616E;
-constexpr uint32_t STOOD_STILL = 0x61726D21;
+constexpr uint32_t STOOD_STILL = 0x706C6121;
+static_assert((RUNNING ^ STOOD_STILL) <= 0xFF, "the interrupt writes one byte");
 
 __attribute__((section(".noinit"))) uint32_t trace;
 
@@ -46,4 +48,15 @@ void watchdog_feed() { wdt_reset(); }
 
 }  // namespace hal
 
-ISR(WDT_vect) { hal::trace = hal::STOOD_STILL; }
+// Registers of the interrupts, as in step_interrupts.cpp; flags stay as they are.
+ISR(WDT_vect, ISR_NAKED) {
+    __asm__ __volatile__(
+        R"(
+        movw r4, r30
+        ldi  r30, %[stood_still]
+        sts  %[trace], r30
+        movw r30, r4
+        reti
+        )" ::[stood_still] "M"(hal::STOOD_STILL & 0xFF),
+        [trace] "i"(&hal::trace));
+}

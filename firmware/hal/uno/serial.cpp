@@ -172,7 +172,10 @@ ISR(USART_RX_vect, ISR_NAKED) {
         out  %[sreg], r2
         reti
 
-    7:  ldi  r30, %[all_disarmed]       ; end all pulses
+    7:  ldi  r30, %[line]
+        mov  r3, r30
+    .Lend_pulses:                       ; for the cause in r3; the stop input's interrupt comes here, too
+        ldi  r30, %[all_disarmed]
         sts  %[tccra], r30
         .if %[second_match]
         lds  r30, %[tccra] + 4          ; they fall after the least high time
@@ -197,8 +200,7 @@ ISR(USART_RX_vect, ISR_NAKED) {
         lds  r30, %[emergencies]
         inc  r30
         sts  %[emergencies], r30
-        ldi  r30, %[line]
-        sts  %[cause], r30
+        sts  %[cause], r3
         movw r30, r4
         out  %[sreg], r2
         reti
@@ -217,12 +219,19 @@ ISR(USART_RX_vect, ISR_NAKED) {
 }
 
 // The stop input's contact opened: what the last emergency byte does.
-ISR(PCINT1_vect) {
-    if (!hal::read_pin(planarm::wire::STOP_PIN)) return;
-    hal::steps_off();
-    hal::fall_soon();
-    hal::emergencies = static_cast<uint8_t>(hal::emergencies + 1);
-    hal::emergency_cause = hal::Emergency::INPUT;
+ISR(PCINT1_vect, ISR_NAKED) {
+    __asm__ __volatile__(
+        R"(
+        sbis %[pins], %[stop]
+        reti
+        in   r2, %[sreg]
+        movw r4, r30
+        ldi  r30, %[input]
+        mov  r3, r30
+        jmp  .Lend_pulses
+        )" ::[sreg] "I"(_SFR_IO_ADDR(SREG)),
+        [pins] "I"(_SFR_IO_ADDR(PINC)), [stop] "I"(hal::bit_of(planarm::wire::STOP_PIN)),
+        [input] "M"(static_cast<uint8_t>(hal::Emergency::INPUT)));
 }
 
 // Cycles with entry and jump: 34 for a byte, 39 for one that must be escaped, 35 for the delimiter; once
