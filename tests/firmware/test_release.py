@@ -123,7 +123,7 @@ def test_a_program_that_uses_a_register_of_the_interrupts_is_refused(tmp_path: P
     shutil.copytree(FIRMWARE, copy, ignore=shutil.ignore_patterns("build", ".pio", "__pycache__"))
     clock = copy / "core" / "clock.cpp"
     source = clock.read_text(encoding="utf-8")
-    spoilt = source.replace("return latest_ticks;", '__asm__ __volatile__("inc r7"); return latest_ticks;')
+    spoilt = source.replace("at.stood_ticks = 0;", '__asm__ __volatile__("inc r7"); at.stood_ticks = 0;')
     assert spoilt != source
     clock.write_text(spoilt, encoding="utf-8")
     command = [sys.executable, str(copy / "build.py"), "avr", "--out", str(tmp_path / "out")]
