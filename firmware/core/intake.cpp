@@ -42,9 +42,9 @@ bool is_out_of_limits(uint8_t joint, int32_t usteps) {
 
 }  // namespace
 
-void reset(const wire::Ledger& ledger) {
+void reset(const step_engine::Position& position) {
     for (uint8_t joint = 0; joint < wire::JOINTS; ++joint) {
-        queue_end.joints[joint] = {JointEnd::FOREVER, ledger.position_usteps[joint], false};
+        queue_end.joints[joint] = {JointEnd::FOREVER, position.usteps[joint], false};
     }
     queue_end.complete = false;
     queued_path_ticks = 0;

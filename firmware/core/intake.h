@@ -4,12 +4,13 @@
 #include <stdint.h>
 
 #include "messages.h"
+#include "step_engine.h"
 
 namespace planarm {
 namespace intake {
 
 // Begins anew, with an empty queue: joints that have not moved yet, where they are.
-void reset(const wire::Ledger& ledger);
+void reset(const step_engine::Position& position);
 // For an arm at rest.
 void set_position(uint8_t joint, int32_t usteps);
 

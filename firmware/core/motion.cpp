@@ -224,9 +224,7 @@ bool Motion::retire(bool& ends_motion) {
 
 void Motion::clear() {
     queue::clear();
-    wire::Ledger ledger;
-    step_engine::tell_position(ledger);
-    intake::reset(ledger);
+    intake::reset(step_engine::position());
     left_ticks = 0;
     need = 0;  // a motion does not starve by the last one's need before it has read its own
     running = begun = reading = segment_last = filling = frozen = starved = false;
@@ -326,7 +324,8 @@ void Motion::halt() {
 }
 
 uint32_t Motion::tell_ledger(wire::Ledger& ledger) const {
-    const uint32_t ticks = clock::extend(step_engine::tell_position(ledger));
+    const step_engine::Position position = step_engine::position();
+    const uint32_t ticks = clock::extend(position.counter);
     uint32_t segments = executed_segments;
     // After a missed step, and while the path clock stands, time does not tell what was executed.
     const uint8_t timely = step_engine::missed() || frozen ? 0 : prepared_count;
@@ -334,6 +333,8 @@ uint32_t Motion::tell_ledger(wire::Ledger& ledger) const {
         if (prepared[i].ends_segment) ++segments;
     }
     ledger.executed_segments = segments;
+    for (uint8_t joint = 0; joint < wire::JOINTS; ++joint)
+        ledger.position_usteps[joint] = position.usteps[joint];
     return clock::device_ticks(ticks);
 }
 

@@ -277,8 +277,10 @@ bool freeze(uint32_t& now_ticks) {
     return true;
 }
 
-uint16_t tell_position(wire::Ledger& ledger) {
+Position position() {
     const Progress now = progress();
+    Position total;
+    total.counter = now.counter;
     uint8_t risen[wire::JOINTS];  // of the active run
     for_each_joint([&](auto joint) {
         constexpr uint8_t NUMBER = joint.NUMBER;
@@ -289,14 +291,14 @@ uint16_t tell_position(wire::Ledger& ledger) {
     });
     for (uint8_t joint = 0; joint < wire::JOINTS; ++joint) {
         const Ring& ring = rings[joint];
-        int32_t usteps = ring.position_usteps;
+        int32_t& usteps = total.usteps[joint];
+        usteps = ring.position_usteps;
         for (const Run* run = ring.oldest; run != now.active[joint]; run = run->next) {
             add_steps(usteps, *run, run->steps);
         }
         add_steps(usteps, *now.active[joint], risen[joint]);
-        ledger.position_usteps[joint] = usteps;
     }
-    return now.counter;
+    return total;
 }
 
 void set_dir_inverted(uint8_t joint, bool inverted) { rings[joint].dir_inverted = inverted; }

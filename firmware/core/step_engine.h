@@ -51,6 +51,11 @@ constexpr uint16_t STEP_MARGIN_TICKS = hal::STEP_MARGIN_TICKS;
 // The same after a change of DIR.
 constexpr uint16_t DIR_MARGIN_TICKS = wire::MIN_DIR_SETUP_TICKS;
 
+struct Position {
+    uint16_t counter;  // the timer at the moment the position is told for
+    int32_t usteps[wire::JOINTS];
+};
+
 // Back to rest with empty rings; positions 0. For start-up, before interrupts are on.
 void reset();
 
@@ -86,9 +91,8 @@ void drop_runs();
 // distance to that tick. False, and nothing is changed, while a step is about to rise or a pulse is high.
 bool freeze(uint32_t& now_ticks);
 
-// Tells the joints' signed steps since start-up, a pulse that is still high included, at the moment that the
-// timer had the count returned.
-uint16_t tell_position(wire::Ledger& ledger);
+// Signed steps since start-up at this instant, a pulse that is still high included.
+Position position();
 
 // Sets the position of a joint without runs.
 void set_position(uint8_t joint, int32_t usteps);
