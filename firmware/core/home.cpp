@@ -61,7 +61,7 @@ bool feed(Homing& at) {
 
 }  // namespace
 
-void reset() { homing.phase = Phase::NONE; }
+void reset() { hal::clear_at_start(homing); }
 
 bool is_good(const wire::Home& told) {
     const bool slow_enough = told.fast_ticks >= MIN_REVERSAL_TICKS && told.slow_ticks >= told.fast_ticks &&

@@ -28,11 +28,7 @@ Power power;
 
 }  // namespace
 
-void reset() {
-    Power& at = hal::by_base(power);
-    at = Power();
-    at.counted_ticks = clock::pass_ticks();
-}
+void reset() { hal::clear_at_start(power); }
 
 void configure() { hal::set_enable_active_high(settings::has_option(settings::ENABLE_ACTIVE_HIGH)); }
 

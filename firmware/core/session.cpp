@@ -1,6 +1,7 @@
 #include "session.h"
 
 #include "commands.h"
+#include "hal_base.h"
 #include "intake.h"
 #include "motion.h"
 #include "reply.h"
@@ -107,10 +108,11 @@ void execute(const Frame& frame) {
 }  // namespace
 
 void reset() {
-    is_open = false;
-    report = Report();
-    welcome_due = status_due = false;
-    checking = nullptr;
+    hal::clear_at_start(is_open);
+    hal::clear_at_start(report);
+    hal::clear_at_start(welcome_due);
+    hal::clear_at_start(status_due);
+    hal::clear_at_start(checking);
 }
 
 void on_frame(const Frame& frame) {

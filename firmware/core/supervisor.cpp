@@ -1,5 +1,6 @@
 #include "supervisor.h"
 
+#include "hal_base.h"
 #include "hal_flash.h"
 #include "home.h"
 #include "motion.h"
@@ -130,9 +131,11 @@ void carry_out(Outcome outcome) {
 }  // namespace
 
 void reset() {
-    current_state = State::IDLE;
-    latched_fault = Fault::NONE;
-    latched_detail = 0;
+    static_assert(static_cast<uint8_t>(State::IDLE) == 0 && static_cast<uint8_t>(Fault::NONE) == 0,
+                  "memory is clear");
+    hal::clear_at_start(current_state);
+    hal::clear_at_start(latched_fault);
+    hal::clear_at_start(latched_detail);
 }
 
 State state() { return current_state; }

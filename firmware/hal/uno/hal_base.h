@@ -1,4 +1,4 @@
-// State that is reached from a base register.
+// State: that is reached from a base register, and that begins as zero.
 #pragma once
 
 namespace hal {
@@ -11,5 +11,9 @@ inline __attribute__((always_inline)) State& by_base(State& state) {
     __asm__("" : "+b"(base));
     return *base;
 }
+
+// Clears state for start-up: here all memory is clear before main.
+template <typename State>
+inline void clear_at_start(State&) {}
 
 }  // namespace hal
