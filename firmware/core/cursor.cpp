@@ -45,11 +45,18 @@ bool Cursor::is_calm(const Slice& slice, uint32_t start_stop_ticks) const {
     return multiply_q16(least_ticks, slice.least_stretch()) >= start_stop_ticks;
 }
 
-void Cursor::find_last(Steps& steps) const {
-    const uint8_t before = static_cast<uint8_t>(steps.count - 1);
-    const uint16_t pairs = static_cast<uint16_t>(before * (before - 1u)) >> 1;
-    steps.last_q16 = at_.low + multiply_low(interval_q16_, before) + multiply_low(add_q16_, pairs);
-    steps.interval_q16 = interval_q16_ + multiply_low(add_q16_, before);
+void Cursor::step() {
+    add_to(at_, from_q16(interval_q16_));
+    increase(interval_q16_, add_q16_);
+}
+
+// n I + n (n - 1) / 2 A further. A product with an A below 0 is 2^32 times the factor too large.
+void Cursor::skip(uint8_t steps) {
+    const uint16_t pairs = static_cast<uint16_t>(steps * (steps - 1u)) >> 1;
+    add_to(at_, multiply(interval_q16_, steps));
+    add_to(at_, multiply(add_q16_, pairs));
+    if (static_cast<int32_t>(add_q16_) < 0) at_.high -= static_cast<uint32_t>(pairs) << 16;
+    increase(interval_q16_, multiply_low(add_q16_, steps));
 }
 
 // As many as the slice before had, or as fit at the interval of now.
@@ -59,49 +66,40 @@ uint8_t Cursor::guess(uint16_t path_ticks) const {
     return whole < step_engine::MAX_RUN_STEPS ? static_cast<uint8_t>(whole + 1) : step_engine::MAX_RUN_STEPS;
 }
 
-// Those before the slice's end; the last slice of a segment takes all that are left. From a guess their
-// number becomes right step by step.
-void Cursor::find_steps(const Slice& slice, Steps& steps) const {
+// To the last step before the slice's end; the last slice of a segment takes all that are left. From a guess
+// their number becomes right in some turns. A step just before the end may be left for a run of its own.
+uint8_t Cursor::go_to_last(const Slice& slice, const Cursor& first) {
     const uint8_t most =
         left_ < step_engine::MAX_RUN_STEPS ? static_cast<uint8_t>(left_) : step_engine::MAX_RUN_STEPS;
-    const uint16_t path_ticks = static_cast<uint16_t>(slice.path_ticks() - at_.high);
-    steps.count = slice.ends_segment() ? most : guess(path_ticks);
-    if (steps.count > most) steps.count = most;
-    find_last(steps);
-    if (slice.ends_segment()) return;
-
-    // Where intervals grow a guess may be longer than 2^32 can tell.
-    while (multiply(steps.interval_q16 - add_q16_, steps.count).high > 0xFFFF) {
-        steps.count = static_cast<uint8_t>(steps.count - (steps.count + 3u) / 4);
-        find_last(steps);
+    uint8_t steps = most;
+    if (!slice.ends_segment()) steps = guess(static_cast<uint16_t>(slice.path_ticks() - at_.high));
+    if (steps > most) steps = most;
+    skip(static_cast<uint8_t>(steps - 1));
+    for (uint8_t less = 1; at_.high >= slice.path_ticks(); less = static_cast<uint8_t>(2 * less)) {
+        steps = steps > less ? static_cast<uint8_t>(steps - less) : 1;
+        *this = first;
+        skip(static_cast<uint8_t>(steps - 1));
     }
-    while (whole_ticks(steps.last_q16) >= path_ticks) {
-        steps.interval_q16 -= add_q16_;
-        steps.last_q16 -= steps.interval_q16;
-        --steps.count;
+    while (steps != most && at_.high + whole_ticks(interval_q16_) + 1 < slice.path_ticks()) {
+        step();
+        ++steps;
     }
-    while (steps.count != most) {
-        const uint32_t next_q16 = steps.last_q16 + steps.interval_q16;
-        if (next_q16 < steps.last_q16 || whole_ticks(next_q16) >= path_ticks) return;
-        steps.last_q16 = next_q16;
-        steps.interval_q16 += add_q16_;
-        ++steps.count;
-    }
+    return steps;
 }
 
 // Intervals that bring the run's steps to its last tick, exactly, and grow as those of the path do when they
 // are stretched, or less where one of them would be shorter than the joint can step. False when the step
 // interrupt cannot bridge them.
-bool Cursor::fit(const Slice& slice, const Steps& steps, uint16_t first_path, Run& run) const {
-    uint16_t first = whole_ticks(interval_q16_);
-    uint16_t last = whole_ticks(steps.interval_q16 - add_q16_);
-    const uint16_t last_path = static_cast<uint16_t>(first_path + whole_ticks(steps.last_q16));
+bool Cursor::fit(const Slice& slice, uint16_t first_path, Run& run) const {
+    uint16_t first = whole_ticks(run.interval_q16);
+    uint16_t last = whole_ticks(interval_q16_ - add_q16_);
+    const uint16_t last_path = static_cast<uint16_t>(at_.high);
     // The stretch is that in the middle of an interval.
     first = slice.stretched(first, static_cast<uint16_t>(first_path + first / 2));
     last = slice.stretched(last, static_cast<uint16_t>(last_path - last / 2));
     if (first > MOST_AHEAD_TICKS || last > MOST_AHEAD_TICKS) return false;
 
-    const uint8_t intervals = static_cast<uint8_t>(steps.count - 1);
+    const uint8_t intervals = static_cast<uint8_t>(run.steps - 1);
     const uint32_t mean_q16 = hal::divide_q16(last_ticks_ - run.first_ticks, intervals);
     run.fraction = 0;
     run.interval_q16 = mean_q16;
@@ -122,42 +120,35 @@ bool Cursor::fit(const Slice& slice, const Steps& steps, uint16_t first_path, Ru
 }
 
 bool Cursor::take(const Slice& slice, Run& run) {
-    Steps steps;
-    find_steps(slice, steps);
+    const Cursor first = *this;
     const uint16_t first_path = static_cast<uint16_t>(at_.high);
     run.positive = positive_;
     run.fraction = at_.low;
     run.interval_q16 = interval_q16_;
     run.add_q16 = add_q16_;
     run.first_ticks = slice.ticks_at(first_path);
+    run.steps = go_to_last(slice, first);
     const bool near = run.first_ticks - last_ticks_ <= MOST_AHEAD_TICKS;
-    last_ticks_ = slice.ticks_at(static_cast<uint16_t>(first_path + whole_ticks(steps.last_q16)));
-    if (steps.count != 1) {
-        const bool fits = slice.is_plain() ? interval_q16_ <= MOST_AHEAD_Q16 &&
-                                                 steps.interval_q16 - add_q16_ <= MOST_AHEAD_Q16
-                                           : fit(slice, steps, first_path, run);
+    last_ticks_ = slice.ticks_at(static_cast<uint16_t>(at_.high));
+    if (run.steps != 1) {
+        const bool fits = slice.is_plain() ? run.interval_q16 <= MOST_AHEAD_Q16 &&
+                                                 interval_q16_ - add_q16_ <= MOST_AHEAD_Q16
+                                           : fit(slice, first_path, run);
         if (!fits) {
+            *this = first;
             last_ticks_ = run.first_ticks;
-            steps.count = 1;
-            find_last(steps);
+            run.steps = 1;
         }
     }
-    run.steps = steps.count;
     // From slice to slice the number of steps changes little: where one run makes them all it is a good
     // guess.
-    const bool all = steps.count != step_engine::MAX_RUN_STEPS && first_path <= whole_ticks(interval_q16_);
-    guess_ = all ? steps.count : 0;
-    advance(steps);
-    return near;
-}
-
-void Cursor::advance(const Steps& steps) {
-    left_ = static_cast<uint16_t>(left_ - steps.count);
-    at_.low = 0;  // that of the first step is in the last one's time
-    add_to(at_, from_q16(steps.last_q16));
+    const bool all =
+        run.steps != step_engine::MAX_RUN_STEPS && first_path <= whole_ticks(first.interval_q16_);
+    guess_ = all ? run.steps : 0;
+    left_ = static_cast<uint16_t>(left_ - run.steps);
     last_path_ticks_ = at_.high;
-    add_to(at_, from_q16(steps.interval_q16));
-    interval_q16_ = steps.interval_q16 + add_q16_;
+    step();
+    return near;
 }
 
 void Cursor::finish(const Slice& slice) {

@@ -34,19 +34,14 @@ class Cursor {
     void finish(const path_clock::Slice& slice);
 
   private:
-    // The next steps of a slice. Times are in 2^-16 ticks from the tick of the first of them, modulo 2^32:
-    // steps of one slice are less than 65,536 ticks apart.
-    struct Steps {
-        uint8_t count;
-        uint32_t last_q16;      // time of the last of them
-        uint32_t interval_q16;  // from the last of them to the step after
-    };
-
-    void find_steps(const path_clock::Slice& slice, Steps& steps) const;
+    // To the next step, and by so many.
+    void step();
+    void skip(uint8_t steps);
+    // From the first step of a run, where it stands, to the last one in the slice; returns how many steps
+    // they are.
+    uint8_t go_to_last(const path_clock::Slice& slice, const Cursor& first);
     uint8_t guess(uint16_t path_ticks) const;
-    void find_last(Steps& steps) const;
-    bool fit(const path_clock::Slice& slice, const Steps& steps, uint16_t first_path, Run& run) const;
-    void advance(const Steps& steps);
+    bool fit(const path_clock::Slice& slice, uint16_t first_path, Run& run) const;
 
     Fixed48 at_;  // path time of the next step, from the slice's start
     uint32_t interval_q16_;
