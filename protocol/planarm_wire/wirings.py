@@ -9,6 +9,22 @@ from planarm_wire.messages import BOARDS
 OWN = "own"
 
 
+def wirings(joints: int = 1) -> tuple[str, ...]:
+    """Return the names of the wirings with pins for so many joints, the own one first."""
+    return tuple(dict.fromkeys(board.pin_map for board in BOARDS.values() if board.joints >= joints))
+
+
+def pins_of(board: Board) -> dict[str, str]:
+    """Return which pins of the Uno do what on a board, in words for people."""
+    joints = enumerate(board.joint_pins, start=1)
+    return {
+        **{f"joint {number}": f"STEP {step}, DIR {direction}" for number, (step, direction) in joints},
+        "drivers": f"ENABLE {board.enable_pin}",
+        "stop input": board.stop_pin,
+        "limit switches": ", ".join(board.limit_pins),
+    }
+
+
 def board_of(joints: int, pin_map: str = OWN) -> Board:
     """Return the board with the fewest joints that has enough of them.
 
@@ -16,8 +32,7 @@ def board_of(joints: int, pin_map: str = OWN) -> Board:
     """
     wired = [board for board in BOARDS.values() if board.pin_map == pin_map]
     if not wired:
-        known = ", ".join(dict.fromkeys(board.pin_map for board in BOARDS.values()))
-        raise WireError(f"no wiring {pin_map!r} is known; there are {known}")
+        raise WireError(f"no wiring {pin_map!r} is known; there are {', '.join(wirings())}")
     fitting = [board for board in wired if board.joints >= joints]
     if not fitting:
         most = max(board.joints for board in wired)

@@ -9,17 +9,22 @@ import pytest
 
 from planarm.bringup.arm_answers import ArmAnswers, JointAnswers, plausibility, scene_text
 from planarm.bringup.calibrate import TouchedPoint, calibrate, calibrated_text, read_points
-from planarm.bringup.nudge import plan_line
+from planarm.bringup.guided import MOST_FOLDED_RAD, touching_poses
+from planarm.bringup.nudge import Mover, plan_line
 from planarm.bringup.person import ask_until, number, numbers, one_of
-from planarm.bringup.setup import ask_arm
+from planarm.bringup.setup import ask_arm, try_joints
 from planarm.cli.main import main
 from planarm.errors import UsageError
 from planarm.model.arm import Arm
 from planarm.model.kinematics import forward
 from planarm.model.transmission import Transmission
+from planarm.notice import silent
+from planarm.pipeline import plan_scene
 from planarm.scene import parse_scene
+from planarm_wire.wirings import OWN, board_of, wirings
 
 ARM = ArmAnswers("test arm", (20.0, 15.0))
+LENGTHS = (20.0, 15.0, 10.0, 6.0)
 TRUE_LENGTHS, TRUE_ZEROS = (20.37, 14.68), (0.031, -0.052)
 POSES = np.radians([[20, -30], [60, -60], [100, -100], [140, -20], [80, -140], [40, -80]])
 
@@ -150,9 +155,11 @@ def test_answers_that_cannot_be_read_are_asked_for_again_and_then_given_up():
 
 def test_words_are_read():
     assert one_of(("up", "down"))("d") == "down"
-    assert numbers(2, 0.0, 9.0)("1 2") == (1.0, 2.0)
+    assert numbers(range(1, 3), 0.0, 9.0)("1 2") == (1.0, 2.0)
     with pytest.raises(ValueError, match="2 are needed"):
-        numbers(2, 0.0, 9.0)("1")
+        numbers(range(2, 3), 0.0, 9.0)("1")
+    with pytest.raises(ValueError, match="5 numbers given, 1 to 4 are needed"):
+        numbers(range(1, 5), 0.0, 9.0)("1 2 3 4 5")
 
 
 def test_a_nudge_turns_one_joint_slowly_and_is_certified():
@@ -163,3 +170,70 @@ def test_a_nudge_turns_one_joint_slowly_and_is_certified():
     assert moved == pytest.approx(10 * ARM.joints[0].usteps_per_deg, abs=1)
     assert not any(m.steps_dir >> 1 for s in plan.segments for m in s.moves[1:2])
     assert plan.duration_ticks / 16e6 > 10.0 / (0.2 * 110.0)
+
+
+@pytest.mark.parametrize(
+    ("lengths", "wiring"),
+    [(LENGTHS[:links], wiring) for links in range(1, len(LENGTHS) + 1) for wiring in wirings(links)],
+)
+def test_the_dialogue_makes_a_scene_of_any_arm_that_a_board_moves(lengths, wiring):
+    person = Scripted([("Lengths", ", ".join(map(str, lengths))), ("Wiring", wiring)])
+    arm = ask_arm(person, "mine", "sim://")
+    scene = arm.scene()
+    assert scene.arm.link_lengths_cm == lengths
+    assert scene.board == board_of(len(lengths), wiring)
+    assert ("Elbow" in "".join(person.asked)) == (len(lengths) == 2)
+    told = "\n".join(person.told)
+    assert f"flash --board {scene.board.name}" in told
+    for joint, (step, direction) in enumerate(scene.board.joint_pins, start=1):
+        assert f"joint {joint}: STEP {step}, DIR {direction}" in told
+    if wiring == OWN and len(lengths) < 4:  # the others are as these, and take longer
+        plan = plan_scene(scene, silent)
+        assert plan.certificate.ok, plan.certificate.explain()
+
+
+def test_an_arm_of_five_links_is_asked_for_again():
+    person = Scripted([("Lengths", "9 9 9 9 9"), ("Lengths", "9")])
+    assert ask_arm(person, "mine", "sim://").links == 1
+    assert any("1 to 4 are needed" in text for text in person.told)
+
+
+@pytest.mark.parametrize("wiring", wirings(4))
+def test_a_joint_that_does_not_turn_is_looked_for_at_the_pins_of_its_own_board(wiring):
+    arm = ArmAnswers("four", LENGTHS, wiring=wiring)
+    person = Scripted([("Which way did joint 4", "not"), ("Try again", "no")])
+    try_joints(person, arm, Mover(lambda _plan, _certificate: None, (1.5, -0.8, -0.5, -0.5)))
+    board = board_of(4, wiring)
+    said = next(text for text in person.told if text.startswith("  Check"))
+    assert all(pin in said for pin in (board.step_pins[3], board.dir_pins[3], board.enable_pin))
+
+
+@pytest.mark.parametrize("lengths", [(20.0, 15.0), (20.0, 15.0, 10.0), (20.0, 15.0, 10.0, 6.0)])
+def test_the_poses_to_touch_tell_more_of_the_arm_than_others(lengths):
+    """More by the determinant of what is known than nine of ten choices at random; derivatives by differences."""
+    scene, links = ArmAnswers("x", lengths).scene(), len(lengths)
+    low, high = np.array(scene.arm.joint_limits_rad).T
+    low[1:], high[1:] = -MOST_FOLDED_RAD, 0.0 if links == 2 else MOST_FOLDED_RAD
+
+    def tips(poses, changes):
+        changed = tuple(np.array(lengths) + changes[:links])
+        return forward(replace(Arm.from_spec(scene.arm), link_lengths_cm=changed), poses + changes[links:])[:, -1]
+
+    def known(poses):
+        units = 1e-6 * np.eye(2 * links)
+        columns = [(tips(poses, unit) - tips(poses, -unit)).ravel() / 2e-6 for unit in units]
+        return np.linalg.slogdet(np.array(columns) @ np.array(columns).T)[1]
+
+    poses = np.array(touching_poses(scene, 2 * links + 2))
+    assert ((poses >= low) & (poses <= high)).all()
+    y = forward(Arm.from_spec(scene.arm), poses)[..., 1]
+    assert links != 2 or (y >= 0.0).all(), "its workspace is above the base"
+    rng = np.random.default_rng(5)
+    at_random = [known(rng.uniform(low, high, poses.shape)) for _ in range(200)]
+    assert known(poses) > np.quantile(at_random, 0.9)
+
+
+def test_joints_that_leave_no_pose_are_told():
+    scene = replace(ARM.scene(), arm=replace(ARM.scene().arm, joint_limits_rad=((-1.0, 1.0), (0.5, 1.0))))
+    with pytest.raises(UsageError, match="leave 0 poses"):
+        touching_poses(scene, 6)

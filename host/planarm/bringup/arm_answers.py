@@ -10,10 +10,16 @@ import numpy as np
 from planarm.scene import MechanicsSpec, Scene, parse_scene
 from planarm.stepping.check_torque import joint_torques_nm, motor_torque_shares
 from planarm.stepping.train import largest_rate_hz
+from planarm_wire.boards import Board
+from planarm_wire.wirings import OWN, board_of
 
 COARSE_TIP_MM = 1.0
 """A tip that jumps by more than this with each micro-step is told."""
 TORQUE_SHARE = 0.5
+PLANNED_BY_TIP = 2
+"""Links of an arm whose tip's place gives its pose, so that its task is told by places and searched in the plane."""
+FIRST_DEG = 30.0
+"""Of the first motion of other arms."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,8 +56,29 @@ class ArmAnswers:
     elbow: str = "up"
     gravity: bool = False
     payload_kg: float = 0.0
-    joints: tuple[JointAnswers, ...] = (JointAnswers(), JointAnswers())
+    joints: tuple[JointAnswers, ...] = ()
+    """One a link; where none are given they are all alike."""
     port: str = "sim://"
+    wiring: str = OWN
+    """Of the drivers; a name of the wire's pin maps."""
+
+    def __post_init__(self) -> None:
+        if not self.joints:
+            object.__setattr__(self, "joints", (JointAnswers(),) * self.links)
+
+    @property
+    def links(self) -> int:
+        """How many."""
+        return len(self.link_lengths_cm)
+
+    @property
+    def board(self) -> Board:
+        """The board that moves it.
+
+        Raises:
+            WireError: none of this wiring steps so many joints.
+        """
+        return board_of(self.links, self.wiring)
 
     def with_joint(self, number: int, joint: JointAnswers) -> ArmAnswers:
         """Return the same arm with another joint `number`, counted from 0."""
@@ -80,7 +107,7 @@ def plausibility(arm: ArmAnswers, number: int) -> list[Remark]:
     step_mm = 10.0 * reach_cm * pi / 180.0 / joint.usteps_per_deg
     rate_hz = joint.max_speed_deg_s * joint.usteps_per_deg
     share = _torque_share(arm, number)
-    most_hz = largest_rate_hz(arm.scene().board)
+    most_hz = largest_rate_hz(arm.board)
     fastest = most_hz / joint.usteps_per_deg
     return [
         Remark(
@@ -116,7 +143,6 @@ def _torque_share(arm: ArmAnswers, number: int) -> float:
 def scene_text(arm: ArmAnswers) -> str:
     """Return the scene file of an arm, with a comment where a person would ask why."""
     reach = sum(arm.link_lengths_cm)
-    start, goal = _task_cm(arm)
     mechanics = MechanicsSpec.usual(arm.link_lengths_cm)
     masses = ", ".join(f"{mass:.3g}" for mass in mechanics.link_masses_kg)
     ends = ", ".join(["0"] * (len(arm.link_lengths_cm) - 1) + [f"{arm.payload_kg:g}"])
@@ -127,15 +153,15 @@ def scene_text(arm: ArmAnswers) -> str:
         f"link_lengths_cm = {_list(arm.link_lengths_cm)}   # joint to joint; planarm calibrate measures them",
         f"link_width_cm = {arm.link_width_cm:g}             # obstacles keep half of it from the links' centre lines",
         f'elbow = "{arm.elbow}"               # "up": theta2 <= 0, "down": theta2 >= 0, "either"',
+        *(["", "[board]", f'wiring = "{arm.wiring}"         # of the drivers (docs/wiring.md)'] * (arm.wiring != OWN)),
         "",
         "[workspace]                     # where the tip may be; obstacles go below as [[obstacles]]",
         f"x_cm = [{-reach:g}, {reach:g}]",
-        f"y_cm = [0, {reach:g}]",
+        f"y_cm = [{0 if arm.links == PLANNED_BY_TIP else -reach:g}, {reach:g}]",
         f"cell_cm = {max(0.25, round(reach / 60.0, 2)):g}",
         "",
         "[task]                          # a first short motion; put your own here",
-        f"start_cm = {_list(start)}",
-        f"goal_cm = {_list(goal)}",
+        *_task_lines(arm),
         "",
         "[mechanics]",
         f"gravity = {str(arm.gravity).lower()}                 # true: the arm stands upright",
@@ -164,6 +190,16 @@ def _joint_lines(number: int, joint: JointAnswers) -> list[str]:
         f"current_a = {joint.current_a:g}                 # what the driver is set to",
         f"supply_v = {joint.supply_v:g}",
     ]
+
+
+def _task_lines(arm: ArmAnswers) -> list[str]:
+    """Return a first short motion: of the tip with two links, else of the joints, which a roadmap is searched for."""
+    if arm.links == PLANNED_BY_TIP:
+        start, goal = _task_cm(arm)
+        return [f"start_cm = {_list(start)}", f"goal_cm = {_list(goal)}"]
+    start_deg = (FIRST_DEG, *(-FIRST_DEG,) * (arm.links - 1))
+    planner = ["", "[planner]", 'algorithm = "mpd_star_lite"     # on a roadmap of joint angles']
+    return [f"start_deg = {_list(start_deg)}", f"goal_deg = {_list((2.0 * FIRST_DEG, *start_deg[1:]))}", *planner]
 
 
 def _task_cm(arm: ArmAnswers) -> tuple[tuple[float, float], tuple[float, float]]:

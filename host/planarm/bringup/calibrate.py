@@ -3,7 +3,7 @@
 With motors at u the joints are at q = T u + z (T the transmission, z the zero angles), and the tip of an arm whose base
 stands at b is at b + sum over k of l_k e(q_1 + ... + q_k). The lengths l and the zeros z that bring the tips nearest to
 the touched points are found by Levenberg and Marquardt's method (scipy.optimize.least_squares). Each point gives two
-equations, so two links with their two zeros need two points, and at least four are asked for: without more points than
+equations, so n links with their n zeros need n points, and at least two more are asked for: without more points than
 that, errors of touching would not show.
 """
 
@@ -24,7 +24,8 @@ from planarm.model.kinematics import forward
 from planarm.model.transmission import Transmission
 from planarm.scene import Scene
 
-LEAST_POINTS = 4
+MORE_POINTS = 2
+"""So many more points than links are asked for at least."""
 WORST_CONDITION = 1e4
 """Beyond it an error of touching of 0.1 mm may be a length wrong by a metre."""
 NEW_LENGTH_SHARE = 0.25
@@ -80,12 +81,14 @@ def calibrate(scene: Scene, points: Sequence[TouchedPoint]) -> Calibration:
     """Return the lengths and zeros that fit the touched points best.
 
     Raises:
-        UsageError: there are fewer than four points, they do not determine the arm, or a length changes by more than a
+        UsageError: there are too few points, they do not determine the arm, or a length changes by more than a
             quarter.
     """
-    if len(points) < LEAST_POINTS:
-        raise UsageError(f"{len(points)} touched points are given, at least {LEAST_POINTS} are needed; touch more")
     links = len(scene.joints)
+    if len(points) < links + MORE_POINTS:
+        raise UsageError(
+            f"{len(points)} touched points are given, at least {links + MORE_POINTS} are needed; touch more"
+        )
     turned = np.array([point.usteps for point in points]) @ Transmission.of(scene).rad_per_ustep.T
     tips = np.array([point.tip_cm for point in points])
     known = np.array([*scene.arm.link_lengths_cm, *(joint.zero_offset_rad for joint in scene.joints)])

@@ -21,7 +21,9 @@ from planarm.trajectory.limits import Limits
 from planarm.trajectory.timing import fastest_motion
 
 SLOW = 0.2
-"""Share of speed and acceleration: whoever stands beside the arm can see what it does."""
+"""Share of the speed: whoever stands beside the arm can see what it does."""
+GENTLE = 0.5
+"""Share of the acceleration: so a stop from that speed is short enough for the queue of every board."""
 
 Execute = Callable[[SegmentPlan, Certificate], None]
 """Streams a plan and waits until it is executed."""
@@ -114,7 +116,7 @@ def plan_line(scene: Scene, start_rad: Floats, end_rad: Floats) -> tuple[Segment
         replace(
             joint,
             max_speed_rad_s=SLOW * joint.max_speed_rad_s,
-            max_acceleration_rad_s2=SLOW * joint.max_acceleration_rad_s2,
+            max_acceleration_rad_s2=GENTLE * joint.max_acceleration_rad_s2,
         )
         for joint in scene.joints
     )

@@ -55,14 +55,15 @@ def number(least: float, most: float) -> Callable[[str], float]:
     return read
 
 
-def numbers(count: int, least: float, most: float) -> Callable[[str], tuple[float, ...]]:
-    """Return what reads so many numbers, with commas or blanks between."""
+def numbers(counts: range, least: float, most: float) -> Callable[[str], tuple[float, ...]]:
+    """Return what reads numbers, as many as `counts` has, with commas or blanks between."""
     one = number(least, most)
+    wanted = f"{counts[0]}" if len(counts) == 1 else f"{counts[0]} to {counts[-1]}"
 
     def read(words: str) -> tuple[float, ...]:
         found = tuple(one(word) for word in words.replace(",", " ").split())
-        if len(found) != count:
-            raise ValueError(f"{len(found)} numbers given, {count} are needed, such as 20, 15")
+        if len(found) not in counts:
+            raise ValueError(f"{len(found)} numbers given, {wanted} are needed, such as 20, 15")
         return found
 
     return read

@@ -5,11 +5,15 @@ from __future__ import annotations
 from dataclasses import replace
 from math import radians
 
-from planarm.bringup.arm_answers import ArmAnswers, JointAnswers, plausibility
+from planarm.bringup.arm_answers import PLANNED_BY_TIP, ArmAnswers, JointAnswers, plausibility
 from planarm.bringup.nudge import Mover
 from planarm.bringup.person import Person, ask_until, number, numbers, one_of
+from planarm_wire.boards import Board
 from planarm_wire.drivers import DRIVERS
+from planarm_wire.messages import BOARDS
+from planarm_wire.wirings import OWN, board_of, pins_of, wirings
 
+MOST_JOINTS = max(board.joints for board in BOARDS.values())
 NUDGE_DEG = 10.0
 MARKS_DEG = 60.0
 """Between two marks: far enough that a degree read wrong is little."""
@@ -26,15 +30,27 @@ def ask_arm(person: Person, name: str, port: str) -> ArmAnswers:
         SceneError: the answers make no scene.
     """
     person.tell("Lengths in centimetres, angles in degrees. Enter takes what stands in brackets.")
-    lengths = ask_until(person, "Lengths of the two links, joint to joint (cm)", "20, 15", numbers(2, 0.1, 1000.0))
+    question = "Lengths of the links, one to four, joint to joint (cm)"
+    lengths = ask_until(person, question, "20, 15", numbers(range(1, MOST_JOINTS + 1), 0.1, 1000.0))
     width = ask_until(person, "Width of the links (cm)", "1", number(0.01, 100.0))
-    elbow = ask_until(person, "Elbow: up, down or either", "up", one_of(("up", "down", "either")))
+    elbow = "either"
+    if len(lengths) == PLANNED_BY_TIP:
+        elbow = ask_until(person, "Elbow: up, down or either", "up", one_of(("up", "down", "either")))
+    known = wirings(len(lengths))
+    wiring = ask_until(person, f"Wiring of the drivers: {', '.join(known)}", OWN, one_of(known))
+    person.tell(wiring_words(board_of(len(lengths), wiring)))
     gravity = ask_until(person, "Does the arm stand upright, so that gravity pulls at it", "no", one_of(YES)) == "yes"
     payload = ask_until(person, "Mass at the tip (kg)", "0", number(0.0, 100.0))
-    arm = ArmAnswers(name, lengths, width, elbow, gravity, payload, port=port)
-    for joint in range(len(lengths)):
+    arm = ArmAnswers(name, lengths, width, elbow, gravity, payload, port=port, wiring=wiring)
+    for joint in range(arm.links):
         arm = _ask_joint(person, arm, joint)
     return arm
+
+
+def wiring_words(board: Board) -> str:
+    """Say which flash image a board needs, and where its drivers are to be wired."""
+    pins = "\n".join(f"  {what}: {which}" for what, which in pins_of(board).items())
+    return f"Board {board.name} (planarm flash --board {board.name}):\n{pins}"
 
 
 def _ask_joint(person: Person, arm: ArmAnswers, number_: int) -> ArmAnswers:
@@ -91,7 +107,10 @@ def _try_sense(person: Person, arm: ArmAnswers, mover: Mover, joint: int) -> Arm
         mover.turn(arm.scene(), joint, radians(NUDGE_DEG))
         went = ask_until(person, f"Which way did joint {joint + 1} turn", PLAIN, one_of(WAYS))
         if went == "not at all":
-            person.tell("  Check the motors' supply, ENABLE (D8), STEP and DIR of that driver.")
+            (step, direction), enable = arm.board.joint_pins[joint], arm.board.enable_pin
+            person.tell(
+                f"  Check the motors' supply, ENABLE ({enable}), STEP ({step}) and DIR ({direction}) of that driver."
+            )
             if ask_until(person, "Try again", "yes", one_of(YES)) == "yes":
                 continue
         elif went != PLAIN:

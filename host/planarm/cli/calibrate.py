@@ -19,6 +19,8 @@ if TYPE_CHECKING:
     from planarm.bringup.calibrate import Calibration, TouchedPoint
     from planarm.scene import Scene
 
+POINTS_A_LINK = 2
+
 
 def execute(options: argparse.Namespace) -> int:
     """Read or touch the points, fit, tell, and write the scene anew."""
@@ -42,14 +44,16 @@ def execute(options: argparse.Namespace) -> int:
 
 def _touch(scene: Scene, options: argparse.Namespace) -> list[TouchedPoint]:
     tell_first_compile("planarm", "planarm_sim")
+    from planarm.bringup.calibrate import MORE_POINTS
     from planarm.bringup.guided import touch_points, touching_poses
 
     person = Terminal()
-    first = touching_poses(scene, options.count)[0]
+    count = options.count or POINTS_A_LINK * len(scene.joints) + MORE_POINTS
+    first = touching_poses(scene, count)[0]
     angles = ", ".join(f"{angle:.1f}" for angle in np.degrees(first))
     person.ask(f"Bring the joints to about ({angles}) degrees; Enter goes on", "")
     with moving(scene, options.port, tuple(map(float, first))) as mover:
-        return touch_points(person, scene, mover, options.count)
+        return touch_points(person, scene, mover, count)
 
 
 def _tell(options: argparse.Namespace, found: Calibration) -> None:

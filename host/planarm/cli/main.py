@@ -359,14 +359,17 @@ def _add_calibrate(commands: Commands) -> None:
     command = commands.add_parser(
         "calibrate",
         help="link lengths and zero angles from touched points",
-        description="Fit link lengths and zero angles to at least four points that the tip has touched: read from a\n"
-        "CSV file with the head motor1_usteps,motor2_usteps,x_cm,y_cm, or with --port touched now.\n"
+        description="Fit link lengths and zero angles to points that the tip has touched, at least two more than\n"
+        "there are links: read from a CSV file with the head motor1_usteps,motor2_usteps,x_cm,y_cm (as many\n"
+        "motors as joints), or with --port touched now.\n"
         "Whether a run lost steps tells 'planarm home SCENE --prove', by the limit switches.",
     )
     command.add_argument("scene", metavar="SCENE", help="the arm as it is thought to be")
     command.add_argument("points", metavar="POINTS.csv", nargs="?", help="where motors and tip were")
     command.add_argument("-o", "--output", metavar="NEW.toml", help="the scene with what was found, all else kept")
-    command.add_argument("--count", type=_count, default=6, metavar="N", help="points to touch with --port (6)")
+    command.add_argument(
+        "--count", type=_count, metavar="N", help="points to touch with --port (two for each link, and two)"
+    )
     _add_port(command)
     _add_json(command)
 

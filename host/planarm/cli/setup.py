@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from planarm.stepping.certificate import Certificate
     from planarm.stepping.plan import SegmentPlan
 
-STRETCHED_DEG = (90.0, -45.0)
+STRETCHED_DEG = (90.0, -45.0, -30.0, -30.0)
 """Where the arm should stand when its joints are tried; only the turning counts."""
 
 
@@ -56,9 +56,10 @@ def execute(options: argparse.Namespace) -> int:
     person = Terminal()
     arm = ask_arm(person, target.stem, options.port or "sim://")
     if options.port:
-        angles = ", ".join(f"{angle:g}" for angle in STRETCHED_DEG)
+        stretched_deg = STRETCHED_DEG[: arm.links]
+        angles = ", ".join(f"{angle:g}" for angle in stretched_deg)
         person.ask(f"Bring the joints to about ({angles}) degrees, with room all around; Enter goes on", "")
-        with moving(arm.scene(), options.port, tuple(radians(angle) for angle in STRETCHED_DEG)) as mover:
+        with moving(arm.scene(), options.port, tuple(radians(angle) for angle in stretched_deg)) as mover:
             arm = try_joints(person, arm, mover)
     with writing(target):
         target.write_text(scene_text(arm), encoding="utf-8")
