@@ -25,6 +25,11 @@ def pins_of(board: Board) -> dict[str, str]:
     }
 
 
+def pin_words(board: Board) -> str:
+    """Return the same on one line."""
+    return "; ".join(f"{what} {which}" for what, which in pins_of(board).items())
+
+
 def board_of(joints: int, pin_map: str = OWN) -> Board:
     """Return the board with the fewest joints that has enough of them.
 

@@ -25,6 +25,7 @@ from planarm.link.journal import Kind, read_journal
 from planarm.link.port_holder import Holder, holders
 from planarm.link.transport import open_transport
 from planarm_wire.framing import Frame, FrameDecoder
+from planarm_wire.messages import BOARDS
 
 FOREVER_S = float("inf")
 
@@ -203,6 +204,7 @@ def test_the_doctor_asks_the_board():
     told = ask_board(open_transport("sim://"))
     assert told["state"] == "idle"
     assert told["position_usteps"] == [0, 0]
+    assert set(told["boards"]) == {board.name for board in BOARDS.values() if board.joints == 2}
     assert 1.0 < told["round_trip_ms"] < 5.0
 
 

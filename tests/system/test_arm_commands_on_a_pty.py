@@ -111,8 +111,11 @@ def test_stop_asks_the_program_that_has_the_port_and_the_arm_rests_on_its_path(t
         assert run.returncode == 5
         assert "stopped as asked" in " ".join(rest.split())
         assert "position exact" in " ".join(rest.split())
-        state = told(start("status", scene, "--json"))["board"]["state"]
+        status = told(start("status", scene, "--json"))
+        state, wiring = status["board"]["state"], status["wiring"]
         assert state in ("ready", "idle")
+        assert wiring["known_by"] == ("the scene" if state == "idle" else "the image")
+        assert wiring["pins"]["joint 1"] == "STEP D9, DIR D4"
         resumed = start("resume", "out", "--json")
         out, err = resumed.communicate(timeout=LIMIT_S)
         assert resumed.returncode == 0, err

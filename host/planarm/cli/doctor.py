@@ -9,12 +9,15 @@ from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from planarm_wire.messages import BOARDS
+from planarm_wire.wirings import pin_words
+
 if TYPE_CHECKING:
     from planarm.link.doctor import Report
 
 
 def execute(options: argparse.Namespace) -> int:
-    """List ports and findings; with --port ask the board there, too. 5 when something needs a hand."""
+    """List ports and findings; with --port ask the board there, too. Always 0: a finding is no failure."""
     from planarm.link.doctor import ask_board, examine
     from planarm.link.transport import open_transport
 
@@ -37,4 +40,6 @@ def _words(report: Report) -> str:
         if finding.advice:
             lines.append(f"   {finding.advice}")
     lines += [f"board {name}: {value}" for name, value in report.board.items()]
+    steps = report.board.get("joints")
+    lines += [f"pins of {board.name}: {pin_words(board)}" for board in BOARDS.values() if board.joints == steps]
     return "\n".join(lines)

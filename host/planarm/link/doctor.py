@@ -15,7 +15,7 @@ from planarm.link.exchange import open_session, request
 from planarm.link.journal import JournalWriter, Kind
 from planarm.link.port_holder import PROC, holders
 from planarm.link.transport import Transport
-from planarm_wire.messages import Query, State
+from planarm_wire.messages import BOARDS, Query, State
 
 BY_ID = Path("/dev/serial/by-id")
 UDEV_RULES = (Path("/etc/udev/rules.d"), Path("/usr/lib/udev/rules.d"), Path("/run/udev/rules.d"))
@@ -77,6 +77,8 @@ def examine(folder: Path, proc: Path = PROC, by_id: Path = BY_ID, rules: Sequenc
 def ask_board(transport: Transport) -> dict[str, object]:
     """Say HELLO and ask a few times; return what the board tells, with the round trips.
 
+    An image tells how many joints it steps, not their wiring: `boards` names those that it may be.
+
     Raises:
         LinkError: it does not answer, or is none of ours.
         DeviceFault: it refuses.
@@ -91,6 +93,7 @@ def ask_board(transport: Transport) -> dict[str, object]:
     return {
         "firmware": ".".join(map(str, session.welcome.firmware_version)),
         "joints": session.welcome.joints,
+        "boards": [board.name for board in BOARDS.values() if board.joints == session.welcome.joints],
         "boot_nonce": f"{session.welcome.boot_nonce:#010x}",
         "reset_cause": session.welcome.reset_cause.name.lower(),
         "interrupted": bool(session.welcome.interrupted),
