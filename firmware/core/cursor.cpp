@@ -36,11 +36,9 @@ bool Cursor::is_calm(const Slice& slice, uint32_t start_stop_ticks) const {
     if (!has_step_in(slice)) return true;
     uint32_t least_ticks = at_.high - last_path_ticks_;
     if (left_ > 1) {
-        const uint16_t first = whole_ticks(interval_q16_);
-        const uint16_t last =
-            whole_ticks(interval_q16_ + multiply_low(add_q16_, static_cast<uint16_t>(left_ - 2)));
-        if (first < least_ticks) least_ticks = first;
-        if (last < least_ticks) least_ticks = last;
+        least_ticks = least_of(least_ticks, interval_q16_ >> 16);
+        const uint32_t change = multiply_low(add_q16_, static_cast<uint16_t>(left_ - 2));
+        least_ticks = least_of(least_ticks, (interval_q16_ + change) >> 16);
     }
     return multiply_q16(least_ticks, slice.least_stretch()) >= start_stop_ticks;
 }

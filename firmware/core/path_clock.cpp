@@ -47,12 +47,8 @@ uint32_t rate_value(uint8_t code) {
 uint32_t stretch_after(uint32_t stretch, const Way& way) {
     const uint32_t target = way.target;
     const uint32_t rate_path = multiply_saturated(way.rate, way.path_ticks);
-    if (stretch < target) {
-        const uint32_t end = slowed(stretch, rate_path);
-        return end < target ? end : target;
-    }
-    const uint32_t end = sped_up(stretch, rate_path);
-    return end > target ? end : target;
+    if (stretch < target) return least_of(slowed(stretch, rate_path), target);
+    return most_of(sped_up(stretch, rate_path), target);
 }
 
 void Slice::follow(const Way& way) {
@@ -61,9 +57,8 @@ void Slice::follow(const Way& way) {
     ends_segment_ = way.ends_segment;
     s0_ = s1_;
     if (s1_ != way.target) s1_ = stretch_after(s1_, way);
-    plain_ = s0_ == ONE && s1_ == ONE;
-    const uint32_t ticks = plain_ ? way.path_ticks : multiply((s0_ + s1_) >> 1, way.path_ticks).high;
-    increase(end_ticks_, ticks);
+    plain_ = (s0_ | s1_) == ONE;  // neither is less
+    increase(end_ticks_, multiply((s0_ + s1_) >> 1, way.path_ticks).high);
     if (s0_ != s1_) reciprocal_ = 0xFFFFFFFF / way.path_ticks;
 }
 
@@ -73,7 +68,8 @@ uint32_t Slice::stretch_at(uint16_t path) const {
     return multiply(s0_, static_cast<uint16_t>(~share)).high + multiply(s1_, share).high;
 }
 
-uint32_t Slice::stretched_ticks_at(uint16_t path) const {
+uint32_t Slice::ticks_at(uint16_t path) const {
+    if (plain_) return start_ticks_ + path;
     return start_ticks_ + multiply((s0_ + stretch_at(path)) >> 1, path).high;
 }
 

@@ -48,16 +48,15 @@ class Slice {
     uint16_t path_ticks() const { return path_ticks_; }
     uint32_t end_ticks() const { return end_ticks_; }
     uint32_t end_stretch() const { return s1_; }
-    uint32_t least_stretch() const { return s0_ < s1_ ? s0_ : s1_; }
+    uint32_t least_stretch() const { return least_of(s0_, s1_); }
 
     // The tick of a path time since the slice's start.
-    uint32_t ticks_at(uint16_t path) const { return plain_ ? start_ticks_ + path : stretched_ticks_at(path); }
+    uint32_t ticks_at(uint16_t path) const;
     // A time so short that begins there and lasts as long on the path, saturated.
     uint16_t stretched(uint16_t ticks, uint16_t path) const;
 
   private:
     uint32_t stretch_at(uint16_t path) const;
-    uint32_t stretched_ticks_at(uint16_t path) const;
 
     uint32_t start_ticks_;
     uint32_t end_ticks_;

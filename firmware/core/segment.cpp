@@ -16,23 +16,21 @@ bool is_interval(uint32_t ticks_q16) {
 }  // namespace
 
 // Intervals change by the same amount each time, so all are in their limits when the first and the last are.
-bool run_ticks(const Move& move, uint32_t& ticks) {
-    ticks = 0;
-    if (move.steps < 2) return true;
+uint32_t run_ticks(const Move& move) {
+    if (move.steps < 2) return 0;
     const uint32_t first = move.interval_q16;
     const bool shrinks = move.add_q16 < 0;
     const uint32_t add = static_cast<uint32_t>(move.add_q16);
     const uint32_t change =
         multiply_saturated(shrinks ? 0 - add : add, static_cast<uint16_t>(move.steps - 2));
     const uint32_t last = shrinks ? first - change : first + change;
-    if ((last < first) != (shrinks && change != 0)) return false;  // does not fit
-    if (!is_interval(first) || !is_interval(last)) return false;
+    const bool fits = (last < first) == (shrinks && change != 0);
+    if (!fits || !is_interval(first) || !is_interval(last)) return NO_RUN;
     // n (first + last) / 2 for n = steps - 1 intervals.
     const uint16_t n = static_cast<uint16_t>(move.steps - 1);
     Fixed48 twice = multiply(first, n);
     add_to(twice, multiply(last, n));
-    ticks = twice.high >> 1;
-    return true;
+    return twice.high >> 1;
 }
 
 void read_head(Reader& reader, SegmentHead& head) {
@@ -71,11 +69,8 @@ bool check_move(const Move& move, uint32_t duration_ticks, JointEnd& end) {
         end.rest_ticks = longer_rest(end.rest_ticks, duration_ticks);
         return true;
     }
-    uint32_t last_ticks;
-    if (move.steps > wire::MAX_SEGMENT_STEPS || move.first_ticks >= duration_ticks ||
-        !run_ticks(move, last_ticks))
-        return false;
-    last_ticks += move.first_ticks;
+    if (move.steps > wire::MAX_SEGMENT_STEPS || move.first_ticks >= duration_ticks) return false;
+    const uint32_t last_ticks = move.first_ticks + run_ticks(move);
     if (last_ticks >= duration_ticks) return false;
 
     const uint16_t least_ticks =

@@ -37,9 +37,9 @@ struct JointEnd {
 // Least time between two steps of a joint in opposite directions.
 constexpr uint16_t MIN_REVERSAL_TICKS = wire::MIN_INTERVAL_TICKS + wire::MIN_DIR_SETUP_TICKS;
 
-// Whether all intervals of a move are in their limits; if so, `ticks` are those from its first to its last
-// step.
-bool run_ticks(const Move& move, uint32_t& ticks);
+// Ticks from a move's first step to its last; longer than any segment when an interval breaks its limits.
+constexpr uint32_t NO_RUN = 0x80000000;
+uint32_t run_ticks(const Move& move);
 
 // Read the fields of the next segment: its head, then a move for each joint.
 void read_head(Reader& reader, SegmentHead& head);
