@@ -60,7 +60,7 @@ void Cursor::skip(uint8_t steps) {
 // As many as the slice before had, or as fit at the interval of now.
 uint8_t Cursor::guess(uint16_t path_ticks) const {
     if (guess_ != 0) return guess_;
-    const uint16_t whole = static_cast<uint16_t>(path_ticks / (whole_ticks(interval_q16_) + 1u));
+    const uint32_t whole = path_ticks / ((interval_q16_ >> 16) + 1);
     return whole < step_engine::MAX_RUN_STEPS ? static_cast<uint8_t>(whole + 1) : step_engine::MAX_RUN_STEPS;
 }
 

@@ -66,23 +66,28 @@ void missed(uint8_t joint) {
     fail(wire::Fault::MISSED_DEADLINE, joint);
 }
 
+// The event that tells how a motion goes on.
+constexpr supervisor::Event event_of(motion::Progress progress) {
+    return static_cast<supervisor::Event>(static_cast<uint8_t>(supervisor::Event::AT_REST) +
+                                          static_cast<uint8_t>(progress) -
+                                          static_cast<uint8_t>(motion::Progress::AT_REST));
+}
+static_assert(event_of(motion::Progress::STARVED) == supervisor::Event::STARVED &&
+                  event_of(motion::Progress::FED) == supervisor::Event::FED &&
+                  event_of(motion::Progress::DONE) == supervisor::Event::DONE,
+              "the same order");
+
 void serve_motion() {
-    using supervisor::Event;
-    switch (motion::serve()) {
+    const motion::Progress progress = motion::serve();
+    switch (progress) {
         case motion::Progress::GOING:
             return;
-        case motion::Progress::DONE:
-            return tell(Event::DONE);
-        case motion::Progress::AT_REST:
-            return tell(Event::AT_REST);
-        case motion::Progress::STARVED:
-            return tell(Event::STARVED);
-        case motion::Progress::FED:
-            return tell(Event::FED);
         case motion::Progress::MISSED:
             return missed(0);
         case motion::Progress::UNDERRUN:
             return fail(wire::Fault::UNDERRUN);
+        default:
+            return tell(event_of(progress));
     }
 }
 

@@ -21,41 +21,35 @@ constexpr uint32_t NEAR_TICKS = 32000;
 constexpr uint32_t PAUSE_TICKS = 1600000;
 
 struct Homing {
-    wire::Home order;
+    wire::Home
+        order;  // fast_ticks and most_usteps are the phase's: its interval, and its steps that are left
     Phase phase;
-    uint32_t interval_ticks;
-    uint32_t steps_left;
     uint32_t next_ticks;  // of the next step
-    bool first_step;
 };
 
 Homing homing;
 
 void enter(Homing& at, Phase phase, uint32_t start_ticks) {
-    const bool approach = phase == Phase::APPROACH;
     at.phase = phase;
-    at.interval_ticks = approach ? at.order.fast_ticks : at.order.slow_ticks;
-    at.steps_left = approach ? at.order.most_usteps : at.order.back_usteps;
     at.next_ticks = start_ticks;
-    at.first_step = true;
+    if (phase == Phase::APPROACH) return;
+    at.order.fast_ticks = at.order.slow_ticks;
+    at.order.most_usteps = at.order.back_usteps;
 }
 
-// False when all steps of the phase were made.
+// False when all steps of the phase were made. A run of one step needs no interval.
 bool feed(Homing& at) {
     const int32_t ahead_ticks = clock::ticks_until(at.next_ticks);
     if (ahead_ticks > AHEAD_TICKS) return true;
-    if (at.steps_left == 0) return ahead_ticks > 0;
+    if (at.order.most_usteps == 0) return ahead_ticks > 0;
     if (!step_engine::has_room(at.order.joint)) return true;
     Run& run = step_engine::next_run(at.order.joint);
     run.first_ticks = at.next_ticks;
-    run.interval_q16 = run.add_q16 = 0;
-    run.fraction = 0;
     run.steps = 1;
     run.positive = (at.order.positive == 1) != (at.phase == Phase::BACK);
-    step_engine::append(at.order.joint, !at.first_step && at.interval_ticks <= NEAR_TICKS);
-    at.first_step = false;
-    increase(at.next_ticks, at.interval_ticks);
-    --at.steps_left;
+    step_engine::append(at.order.joint, at.order.fast_ticks <= NEAR_TICKS);
+    increase(at.next_ticks, at.order.fast_ticks);
+    --at.order.most_usteps;
     return true;
 }
 

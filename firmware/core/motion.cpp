@@ -94,8 +94,7 @@ class Motion {
     uint32_t override_stretch;
 
     bool reading;  // a payload
-    uint32_t slow_value;
-    uint32_t fast_value;
+    path_clock::Rates rates;
     uint8_t need;  // in NEED_UNIT_TICKS
 
     bool segment_last;
@@ -126,8 +125,8 @@ bool Motion::is_starving(uint8_t margin) const {
     if (!reading) {
         if (queue::is_empty()) return;
         queue::read_front(payload);
-        slow_value = path_clock::rate_value(payload.u8());
-        fast_value = path_clock::rate_value(payload.u8());
+        rates.slow = payload.u8();
+        rates.fast = payload.u8();
         need = payload.u8();
         reading = true;
     }
@@ -159,14 +158,15 @@ bool is_calm() {
 [[gnu::noinline]] void Motion::open_slice() {
     path_clock::Way way;
     way.ends_segment = left_ticks <= slice_ticks;
-    way.path_ticks = way.ends_segment ? static_cast<uint16_t>(left_ticks) : slice_ticks;
+    way.path_ticks = slice_ticks;
+    if (way.ends_segment) way.path_ticks = static_cast<uint16_t>(left_ticks);
     left_ticks -= way.path_ticks;
     const bool quickly = wish == Wish::REST_QUICKLY || is_starving(STARVING_MARGIN);
     way.target = quickly || wish == Wish::REST ? path_clock::MAX_STRETCH : override_stretch;
-    way.rate = way.target > slice.end_stretch() ? slow_value : fast_value;
-    if (!quickly) way.rate >>= 1;
+    way.rates = rates;
+    way.gently = !quickly;
     slice.follow(way);
-    Prepared& entry = prepared[prepared_count++];
+    Prepared& entry = hal::by_base(prepared[prepared_count++]);
     entry.end_ticks = slice.end_ticks();
     entry.ends_segment = way.ends_segment;
     entry.ends_motion = way.ends_segment && segment_last;

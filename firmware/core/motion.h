@@ -16,12 +16,14 @@ namespace motion {
 
 enum class Progress : uint8_t {
     GOING,
+    // as supervisor::Event has them
+    AT_REST,  // as was wished
+    STARVED,  // at rest because the queue ran low
+    FED,      // goes on after that
     DONE,
+    // faults
     MISSED,    // a step came too late
     UNDERRUN,  // the queue ran empty before the last segment
-    AT_REST,   // as was wished
-    STARVED,   // at rest because the queue ran low
-    FED,       // goes on after that
 };
 
 // What the path clock is to do.

@@ -46,7 +46,10 @@ uint32_t rate_value(uint8_t code) {
 
 uint32_t stretch_after(uint32_t stretch, const Way& way) {
     const uint32_t target = way.target;
-    const uint32_t rate_path = multiply_saturated(way.rate, way.path_ticks);
+    uint32_t rate = rate_value(stretch < target ? way.rates.slow : way.rates.fast);
+    static_assert(wire::GENTLE_PERCENT == 50, "a half");
+    if (way.gently) rate >>= 1;
+    const uint32_t rate_path = multiply_saturated(rate, way.path_ticks);
     if (stretch < target) return least_of(slowed(stretch, rate_path), target);
     return most_of(sped_up(stretch, rate_path), target);
 }

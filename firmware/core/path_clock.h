@@ -22,13 +22,19 @@ static_assert(wire::SLICE_TICKS <= 0xFFFF, "path times in a slice have 16 bits")
 // The value of a rate code, in 2^-32 a tick.
 uint32_t rate_value(uint8_t code);
 
-// What is asked of a slice: its length, the stretch that is wished for its end, and by what rate the clock
-// may change.
+// Codes of the rates by which the clock may change.
+struct Rates {
+    uint8_t slow;  // slowing down
+    uint8_t fast;  // speeding up
+};
+
+// What is asked of a slice: its length, the stretch that is wished for its end, and the rates.
 struct Way {
     uint16_t path_ticks;
     bool ends_segment;
+    bool gently;  // by GENTLE_PERCENT of the rates
     uint32_t target;
-    uint32_t rate;  // in 2^-32 a tick
+    Rates rates;
 };
 
 // The stretch at the way's end, as near to its target as its rate allows.

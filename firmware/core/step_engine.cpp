@@ -32,6 +32,9 @@ struct Ring {
 
 Ring rings[wire::JOINTS];
 
+// A call takes less code than the product.
+[[gnu::noinline]] Ring& ring_of(uint8_t joint) { return rings[joint]; }
+
 // Moves a position on by steps of a run, modulo 2^32: SET_POSITION takes any.
 [[gnu::noinline]] void add_steps(int32_t& position_usteps, const Run& run, uint8_t steps) {
     const uint32_t before = static_cast<uint32_t>(position_usteps);
@@ -39,7 +42,7 @@ Ring rings[wire::JOINTS];
 }
 
 void clear(uint8_t joint) {
-    Ring& ring = rings[joint];
+    Ring& ring = ring_of(joint);
     for (uint8_t i = 0; i < RING_RUNS; ++i) {
         ring.runs[i].chained = Chain::NONE;
         ring.runs[i].next = &ring.runs[(i + 1) % RING_RUNS];
@@ -60,7 +63,7 @@ Run* active_run(uint8_t joint) {
 }
 
 void take_back(uint8_t joint) {
-    Ring& ring = rings[joint];
+    Ring& ring = ring_of(joint);
     const Run* const active = active_run(joint);
     while (ring.oldest != active) {
         ring.oldest->chained = Chain::NONE;
@@ -95,7 +98,7 @@ enum class Due : uint8_t { NO, YES, TOO_LATE };
 // Whether an idle joint's next run must be started now. Its interrupt is off: nobody else writes `active`.
 Due is_due(uint8_t joint) {
     const Run* const run = step_joints[joint].active;
-    if (run == rings[joint].free) return Due::NO;
+    if (run == ring_of(joint).free) return Due::NO;
     const int32_t away_ticks = clock::ticks_until(run->first_ticks);
     if (away_ticks > START_AHEAD_TICKS) return Due::NO;
     return away_ticks > 0 ? Due::YES : Due::TOO_LATE;
@@ -122,7 +125,7 @@ void finish_pulse() {
 // `first_ticks`.
 void cut(uint8_t joint, uint8_t left, uint16_t fraction, uint32_t first_ticks) {
     Run& run = *step_joints[joint].active;
-    add_steps(rings[joint].position_usteps, run, static_cast<uint8_t>(run.steps - left));
+    add_steps(ring_of(joint).position_usteps, run, static_cast<uint8_t>(run.steps - left));
     run.steps = left;
     run.fraction = fraction;
     run.first_ticks = first_ticks;
@@ -184,14 +187,14 @@ void reset() {
     step_missed = 0;
     for (uint8_t joint = 0; joint < wire::JOINTS; ++joint) {
         clear(joint);
-        rings[joint].position_usteps = 0;
-        rings[joint].dir_inverted = false;
+        ring_of(joint).position_usteps = 0;
+        ring_of(joint).dir_inverted = false;
     }
 }
 
 // Executed runs are taken back only when their room is needed.
 bool has_room(uint8_t joint) {
-    const Ring& ring = rings[joint];
+    const Ring& ring = ring_of(joint);
     if (ring.free->next != ring.oldest) return true;
     take_back(joint);
     return ring.free->next != ring.oldest;
@@ -199,15 +202,15 @@ bool has_room(uint8_t joint) {
 
 bool is_idle() {
     for (uint8_t joint = 0; joint < wire::JOINTS; ++joint) {
-        if (active_run(joint) != rings[joint].free) return false;
+        if (active_run(joint) != ring_of(joint).free) return false;
     }
     return true;
 }
 
-Run& next_run(uint8_t joint) { return *rings[joint].free; }
+Run& next_run(uint8_t joint) { return *ring_of(joint).free; }
 
 void append(uint8_t joint, bool near) {
-    Ring& ring = rings[joint];
+    Ring& ring = ring_of(joint);
     Run& run = *ring.free;
     run.dir_high = run.positive != ring.dir_inverted;
     Chain chain = Chain::NONE;
@@ -290,7 +293,7 @@ Position position() {
         risen[NUMBER] = is_on ? static_cast<uint8_t>(steps - now.left[NUMBER] + high) : 0;
     });
     for (uint8_t joint = 0; joint < wire::JOINTS; ++joint) {
-        const Ring& ring = rings[joint];
+        const Ring& ring = ring_of(joint);
         int32_t& usteps = total.usteps[joint];
         usteps = ring.position_usteps;
         for (const Run* run = ring.oldest; run != now.active[joint]; run = run->next) {
@@ -301,11 +304,11 @@ Position position() {
     return total;
 }
 
-void set_dir_inverted(uint8_t joint, bool inverted) { rings[joint].dir_inverted = inverted; }
+void set_dir_inverted(uint8_t joint, bool inverted) { ring_of(joint).dir_inverted = inverted; }
 
 void set_position(uint8_t joint, int32_t usteps) {
     take_back(joint);
-    rings[joint].position_usteps = usteps;
+    ring_of(joint).position_usteps = usteps;
 }
 
 }  // namespace step_engine

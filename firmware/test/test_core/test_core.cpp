@@ -121,8 +121,10 @@ CASE(a_speeding_up_keeps_to_its_allowance_and_never_turns_into_a_slowing) {
         const uint32_t stretch = ONE + random_below(i % 2 == 0 ? 3 * ONE : 255 * ONE);
         const uint32_t target = ONE + random_below(stretch - ONE + 1);
         const uint16_t path_ticks = static_cast<uint16_t>(1 + random_below(wire::SLICE_TICKS));
-        const uint32_t rate = planarm::path_clock::rate_value(static_cast<uint8_t>(random_below(256))) >> 1;
-        const uint32_t end = planarm::path_clock::stretch_after(stretch, {path_ticks, false, target, rate});
+        const uint8_t code = static_cast<uint8_t>(random_below(256));
+        const uint32_t rate = planarm::path_clock::rate_value(code) >> 1;
+        const uint32_t end =
+            planarm::path_clock::stretch_after(stretch, {path_ticks, false, true, target, {0, code}});
         CHECK(end >= target && end <= stretch);
         const double s1 = end / 65536.0;
         const double lawful = s1 + rate / 4294967296.0 * path_ticks * s1 * s1 * s1;
