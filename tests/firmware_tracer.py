@@ -11,6 +11,7 @@ from planarm_wire.boards import Board as Wiring
 SCHEDULED, STEP_1, STEP_2, LAP, RECEIVE, TRANSMIT = 7, 11, 12, 13, 18, 19  # numbers of the vectors, from 0
 ENTRY_CYCLES = 4
 INTERRUPTS_ON = 0x80
+CLI, WDR = b"\xf8\x94", b"\xa8\x95"
 
 
 class Tracer(EmulatedFirmware):
@@ -33,7 +34,8 @@ class Tracer(EmulatedFirmware):
 
     def hold_interrupts(self, ticks: int) -> None:
         """Let the main program run on for a while as if it had switched interrupts off."""
-        self.run_until(lambda: bool(self.chip.sreg & INTERRUPTS_ON))  # an interrupt, or a lock, would switch them on
+        # An interrupt, or a lock, even one that has only read what it will restore, would switch them on.
+        self.run_until(lambda: bool(self.chip.sreg & INTERRUPTS_ON) and self._next_instruction() != CLI)
         self.chip.sreg &= ~INTERRUPTS_ON
         self.uno.run(cycles=ticks)
         # On to the main program's next pass: the end of a lock that is open now would switch off what it found off.
@@ -43,7 +45,10 @@ class Tracer(EmulatedFirmware):
 
     def begins_pass(self) -> bool:
         """True when the next instruction is WDR, with which a pass begins."""
-        return self.uno.flash[2 * self.chip.pc : 2 * self.chip.pc + 2] == b"\xa8\x95"
+        return self._next_instruction() == WDR
+
+    def _next_instruction(self) -> bytes:
+        return self.uno.flash[2 * self.chip.pc : 2 * self.chip.pc + 2]
 
     def taken(self, vector: int) -> set[int]:
         return {cycles for number, cycles in self.done if number == vector}

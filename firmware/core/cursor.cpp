@@ -32,6 +32,8 @@ void Cursor::begin(const Move& move) {
     positive_ = move.positive;
 }
 
+bool Cursor::has_step_in(const Slice& slice) const { return left_ != 0 && at_.high < slice.path_ticks(); }
+
 bool Cursor::is_calm(const Slice& slice, uint32_t start_stop_ticks) const {
     if (!has_step_in(slice)) return true;
     uint32_t least_ticks = at_.high - last_path_ticks_;

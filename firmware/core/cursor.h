@@ -19,9 +19,7 @@ class Cursor {
     void begin(const Move& move);
 
     // True when a step is left in a slice.
-    bool has_step_in(const path_clock::Slice& slice) const {
-        return left_ != 0 && at_.high < slice.path_ticks();
-    }
+    bool has_step_in(const path_clock::Slice& slice) const;
 
     // True when the joint is slower than its start-stop speed all over a slice that was not begun yet.
     bool is_calm(const path_clock::Slice& slice, uint32_t start_stop_ticks) const;

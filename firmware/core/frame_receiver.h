@@ -45,12 +45,14 @@ class FrameReceiver {
     Event special(uint8_t byte);
     Event finish();
 
-    Frame frame_;
+    // The frame last: what comes behind it is too far from the object's address for the AVR's short
+    // instructions.
     uint8_t count_;
     uint8_t end_;  // bytes that the frame has when complete, as far as known
     uint16_t crc_;
     bool escaped_;
     bool damaged_;
+    Frame frame_;
 };
 
 }  // namespace planarm

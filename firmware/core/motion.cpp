@@ -49,7 +49,6 @@ struct Prepared {
 
 Prepared prepared[MAX_SLICES];
 Cursor cursors[wire::JOINTS];
-Slice slice;     // being filled, or the last one filled
 Reader payload;  // the oldest, being read
 
 class Motion {
@@ -75,12 +74,14 @@ class Motion {
     void open_slice();
     bool fill_slice();
     void prepare();
-    bool retire(bool& ends_motion);
+    Progress retire();
     void clear();
     void thaw();
     bool may_freeze() const;
     Progress serve_frozen();
     Progress freeze_if_due();
+
+    Slice slice;  // being filled, or the last one filled
 
     bool running;
     bool begun;  // the first slice
@@ -148,13 +149,6 @@ bool Motion::is_starving(uint8_t margin) const {
     intake::begin_segment(left_ticks);
 }
 
-bool is_calm() {
-    for (uint8_t joint = 0; joint < wire::JOINTS; ++joint) {
-        if (!cursors[joint].is_calm(slice, settings::config.start_stop_ticks[joint])) return false;
-    }
-    return true;
-}
-
 [[gnu::noinline]] void Motion::open_slice() {
     path_clock::Way way;
     way.ends_segment = left_ticks <= slice_ticks;
@@ -170,7 +164,10 @@ bool is_calm() {
     entry.end_ticks = slice.end_ticks();
     entry.ends_segment = way.ends_segment;
     entry.ends_motion = way.ends_segment && segment_last;
-    entry.calm = is_calm();
+    entry.calm = true;
+    for (uint8_t joint = 0; joint < wire::JOINTS; ++joint) {
+        if (!cursors[joint].is_calm(slice, settings::config.start_stop_ticks[joint])) entry.calm = false;
+    }
     filling = true;
 }
 
@@ -181,7 +178,7 @@ bool Motion::fill_slice() {
     uint8_t joint = turn;
     for (uint8_t i = 0; i < wire::JOINTS; ++i) {
         joint = joint == wire::JOINTS - 1 ? 0 : static_cast<uint8_t>(joint + 1);
-        Cursor& cursor = cursors[joint];
+        Cursor& cursor = hal::by_base(cursors[joint]);
         if (!cursor.has_step_in(slice)) continue;
         if ((!urgent || slice.is_plain()) && step_engine::has_room(joint)) {
             step_engine::append(joint, cursor.take(slice, step_engine::next_run(joint)));
@@ -208,18 +205,21 @@ void Motion::prepare() {
     filling = !fill_slice();
 }
 
-// Takes executed slices off the list. True when the last of them ended what was received.
-bool Motion::retire(bool& ends_motion) {
+// Takes executed slices off the list. When the last of them ended what was received, so does the motion.
+Progress Motion::retire() {
     while (prepared_count != 0 && clock::has_come(prepared[0].end_ticks)) {
         // The last steps of joints 3 and 4 may rise some hundred ticks after their own.
-        if (prepared_count == 1 && !step_engine::is_idle()) return false;
+        if (prepared_count == 1 && !step_engine::is_idle()) return Progress::GOING;
         if (prepared[0].ends_segment) ++executed_segments;
-        ends_motion = prepared[0].ends_motion;
+        const bool ends_motion = prepared[0].ends_motion;
         --prepared_count;
         for (uint8_t i = 0; i < prepared_count; ++i) prepared[i] = prepared[i + 1];
-        if (prepared_count == 0 && !is_in_segment() && queue::is_empty()) return true;
+        if (prepared_count == 0 && !is_in_segment() && queue::is_empty()) {
+            clear();
+            return ends_motion ? Progress::DONE : Progress::UNDERRUN;
+        }
     }
-    return false;
+    return Progress::GOING;
 }
 
 void Motion::clear() {
@@ -300,25 +300,22 @@ Progress Motion::serve() {
     if (frozen) return serve_frozen();
     begun = begun || clock::has_come(begin_ticks);
     if (!step_engine::serve()) return Progress::MISSED;
-    bool ends_motion = false;
-    Progress progress = Progress::GOING;
-    while (!retire(ends_motion)) {
-        if (progress != Progress::GOING) return progress;  // what ended before the clock stood is executed
-        progress = freeze_if_due();
-        if (progress != Progress::GOING) continue;
+    Progress ended = retire();
+    if (ended != Progress::GOING) return ended;
+    const Progress rest = freeze_if_due();
+    if (rest == Progress::GOING) {
         prepare();  // last, as it takes longest: the pass has one time
-        return progress;
+        return rest;
     }
-    clear();
-    return ends_motion ? Progress::DONE : Progress::UNDERRUN;
+    ended = retire();  // what ended before the clock stood is executed
+    return ended != Progress::GOING ? ended : rest;
 }
 
 void Motion::halt() {
     const bool is_timely = running && !frozen && !step_engine::missed();
     clock::begin_pass();                             // a pass that writes the EEPROM may be long
     clock::begin_pass_at(step_engine::end_steps());  // the segments whose steps have risen are executed
-    bool ends_motion;
-    if (is_timely) retire(ends_motion);
+    if (is_timely) retire();
     step_engine::drop_runs();
     clear();
 }

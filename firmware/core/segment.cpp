@@ -59,7 +59,7 @@ void read_move(Reader& reader, Move& move) {
 }
 
 // A rest that is so much longer; what does not fit is FOREVER. `ticks` are less than 2^31.
-uint16_t longer_rest(uint16_t rest_ticks, uint32_t ticks) {
+[[gnu::noinline]] uint16_t longer_rest(uint16_t rest_ticks, uint32_t ticks) {
     ticks += rest_ticks;
     return ticks < JointEnd::FOREVER ? static_cast<uint16_t>(ticks) : JointEnd::FOREVER;
 }

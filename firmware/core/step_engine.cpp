@@ -22,12 +22,12 @@ constexpr int32_t START_AHEAD_TICKS = 0x7000;
 constexpr uint16_t FREEZE_MARGIN_TICKS = 200;
 
 struct Ring {
-    Run runs[RING_RUNS];
     Run* oldest;              // not yet taken back
     Run* free;                // the next to be filled
     int32_t position_usteps;  // of all runs taken back
     bool positive;            // direction of the run appended last
     bool dir_inverted;
+    Run runs[RING_RUNS];  // last: see FrameReceiver
 };
 
 Ring rings[wire::JOINTS];

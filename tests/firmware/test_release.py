@@ -68,7 +68,7 @@ def test_description_is_true() -> None:
 
 
 def test_image_leaves_room() -> None:
-    assert TOLD["flash_bytes"] <= 18_100  # docs/decisions/0095; the Uno has 32,256 for it
+    assert TOLD["flash_bytes"] <= 17_650  # docs/decisions/0095; the Uno has 32,256 for it
 
 
 @needs_avr_gcc
@@ -174,7 +174,7 @@ def test_an_entry_into_the_common_prologue_that_saves_a_kept_register_is_refused
         builder.require_free_registers(Path("any.elf"), flags)
 
 
-LOCK_CYCLES = {"uno": 13, "uno_four": 27, "uno_slow": 17}
+LOCK_CYCLES = {"uno": 13, "uno_four": 29, "uno_slow": 17}
 # Around the start of a joint at rest, what rests, and what ends a motion; but in the last the other joint may step.
 LONG_LOCK_CYCLES = {"serve": 50, "freeze": 80, "end_steps": 34}
 
