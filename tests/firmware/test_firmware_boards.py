@@ -29,6 +29,7 @@ from planarm_wire.codec import encode
 from planarm_wire.framing import encode_frame
 from planarm_wire.messages import (
     BOARDS,
+    DEBOUNCE_TICKS,
     DELIMITER,
     EMERGENCY_CODE,
     HOLD_CODE,
@@ -39,6 +40,7 @@ from planarm_wire.messages import (
     Config,
     Enable,
     Fault,
+    Home,
     PinMap,
     Query,
     Result,
@@ -309,3 +311,69 @@ def test_cycles_of_the_scheduled_interrupt() -> None:
     groups = [[c for c in taken if low <= c <= high] for low, high in (LOOK_CYCLES, ONE_STEP_CYCLES, BOTH_CYCLES)]
     assert all(groups)
     assert sum(map(len, groups)) == len(taken), taken
+
+
+WATCH_SWITCHES = 8  # a bit of CONFIG's options
+
+
+def switched_on(name: str) -> Board:
+    """A board that watches its limit switches, drivers on, all switches open."""
+    board, joints = Board(emulated(name)), BOARDS[name].joints
+    board.hello()
+    board.ask(Config(PinMap[BOARDS[name].pin_map.upper()], joints, 0, WATCH_SWITCHES, 0, 0, 0, (20_000,) * joints))
+    for pin in BOARDS[name].limit_pins:
+        board._firmware.uno.pin(pin).drive(1)
+    board.ask(Enable(1))
+    board.run(WAKE_TICKS)
+    return board
+
+
+@pytest.mark.parametrize("positive", [0, 1])
+@pytest.mark.parametrize(("name", "joint"), [(name, joint) for name in OTHERS for joint in range(BOARDS[name].joints)])
+def test_every_joint_homes_to_its_own_switch(name: str, joint: int, positive: int) -> None:
+    # The switch closes from a place on; those of the other joints are closed from the beginning and mean nothing.
+    closes_at = 30 if positive else -30
+    board = switched_on(name)
+    pins = [board._firmware.uno.pin(pin) for pin in BOARDS[name].limit_pins]
+    for other in range(BOARDS[name].joints):
+        pins[other].drive(int(other == joint))
+    board.run(2 * DEBOUNCE_TICKS)
+    assert board.ask(Home(joint, positive, 20_000, 2 * DEBOUNCE_TICKS, 200, 100)).state is State.HOMING
+    for _ in range(20_000):
+        board.run(2000)
+        at = board.position_at(joint, board.now)
+        pins[joint].drive(int(at < closes_at if positive else at > closes_at))
+        if board.replies and board.replies[-1][1].state is not State.HOMING:  # type: ignore[union-attr]
+            break
+    status = board.ask()
+    assert (status.state, status.fault) == (State.READY, Fault.NONE)
+    wanted = [0] * BOARDS[name].joints
+    wanted[joint] = closes_at
+    assert status.ledger.position_usteps == tuple(wanted)
+    assert [board.position_at(number, board.now) for number in range(BOARDS[name].joints)] == wanted, "by the pins"
+
+
+@pytest.mark.parametrize(("name", "joint"), [(name, joint) for name in OTHERS for joint in range(BOARDS[name].joints)])
+def test_homing_without_a_switch_tells_the_joint(name: str, joint: int) -> None:
+    board = switched_on(name)
+    board.ask(Home(joint, 1, 20_000, 2 * DEBOUNCE_TICKS, 30, 100))
+    board.run(30 * 20_000 + 200_000)
+    status = board.ask()
+    assert (status.state, status.fault, status.detail) == (State.FAULT, Fault.HOMING_FAILED, joint)
+    assert status.ledger.position_usteps[joint] == 30
+
+
+@pytest.mark.parametrize(("name", "joint"), [(name, joint) for name in OTHERS for joint in range(BOARDS[name].joints)])
+def test_a_switch_that_closes_in_motion_tells_its_joint(name: str, joint: int) -> None:
+    board = switched_on(name)
+    for segment in steady(name, 6000, 0.3)[:6]:
+        board.ask(Segments(0, 0, 0, (segment,)))
+    board.ask(Start(LEAD_TICKS))
+    board.run(LEAD_TICKS + 300_000)
+    board._firmware.uno.pin(BOARDS[name].limit_pins[joint]).drive(0)
+    board.run(3 * DEBOUNCE_TICKS)
+    status = board.ask()
+    assert (status.state, status.fault, status.detail) == (State.FAULT, Fault.LIMIT_SWITCH, joint)
+    assert status.ledger.position_usteps == tuple(
+        board.position_at(number, board.now) for number in range(BOARDS[name].joints)
+    )
