@@ -30,6 +30,9 @@ at 12,800, four at 15,000 (uno_four)."""
 SLICE_JOINT_TICKS: Final = 4_000
 """The same on each joint in each further slice of it."""
 
+PREPARED_SLICES: Final = 4
+"""So many slices are prepared at once, the one that is executed included (firmware/core/motion.cpp)."""
+
 LINE_LOAD: Final = 0.1
 """Share of the processor that the interrupts of a busy line take."""
 STRETCHED_JOINT_TICKS: Final = 8_500

@@ -45,6 +45,17 @@ def test_the_board_needs_time_to_read_segments(interval_ticks, segments_hz, verd
     assert verdict_of(checks, "ahead of the board") == verdict
 
 
+@pytest.mark.parametrize(
+    ("duration", "count", "verdict"),
+    [(6_000, 40, "red"), (9_000, 40, "red"), (6_000, 4, "green"), (16_000, 40, "green")],
+)
+def test_segments_that_the_queue_held_at_the_start_must_be_prepared_in_time(duration, count, verdict):
+    """tests/firmware/test_firmware_pace.py: 6,000 ticks in a row end in missed_deadline."""
+    short = duration, Move(2 * 5 + 1, 100, duration // 5 << 8), REST
+    plan = plan_of((400_000, REST, REST), *[short] * count, (400_000, REST, REST))
+    assert verdict_of(checks_of(plan), "ahead of the board") == verdict
+
+
 def test_a_burst_of_short_segments_cannot_be_sent_before_there_is_room():
     # The line is idle for seconds, but the device holds QUEUE_BYTES of segments, about 100 of these, and no more.
     long, short = (10**6, Move(3, 1000), REST), (4000, Move(3, 1000), REST)

@@ -12,6 +12,10 @@ from planarm_wire.board_budget import (
     LATEST_READ_TICKS,
     LEAST_SHARE,
     LINE_LOAD,
+    PREPARED_SLICES,
+    READ_JOINT_TICKS,
+    READ_TICKS,
+    SLICE_JOINT_TICKS,
     STEP_INTERRUPT_TICKS,
     work_ticks,
 )
@@ -19,6 +23,7 @@ from planarm_wire.messages import (
     CRC_BYTES,
     HEADER_BYTES,
     HOST_WINDOW_BYTES,
+    MIN_LEAD_TICKS,
     SLICE_TICKS,
     TICKS_HZ,
 )
@@ -151,6 +156,7 @@ def _check_supply(table: SegmentTable, link: LinkSpec) -> list[Check]:
         board_tick += work[k] / max(1.0 - loads[running], LEAST_SHARE)
         line.append((starts[k] - line_tick, k))
         board.append((starts[k] - board_tick - LATEST_READ_TICKS, k))
+    board.append(_ahead_of_preparing(table))
     checks = []
     for name, found, setting in (
         ("time ahead of the line", line, "link.baud or joints.microsteps"),
@@ -160,6 +166,27 @@ def _check_supply(table: SegmentTable, link: LinkSpec) -> list[Check]:
         where = f"segment {k}, {_time(starts[k])}" if len(found) > 1 else ""
         checks.append(at_least(name, ahead_ticks / TICKS_HZ, 0.0, "s", where, setting))
     return checks
+
+
+def _ahead_of_preparing(table: SegmentTable) -> tuple[float, int]:
+    """Return the least time by which a slice of a segment is prepared before it begins, and the segment.
+
+    That takes its time also where the queue held everything at the start. The board prepares a slice MIN_LEAD_TICKS
+    before its start, and no more than PREPARED_SLICES ahead; what it has to do on a segment is due by its first slice.
+    """
+    moving, loads = (table.counts > 0).sum(axis=1), _interrupt_loads(table)
+    slices = (table.durations - 1) // SLICE_TICKS + 1
+    segment = np.repeat(np.arange(len(slices)), slices)
+    number = np.arange(len(segment)) - np.repeat(np.cumsum(slices) - slices, slices)
+    starts = table.starts[segment] + number * (table.durations // slices)[segment]
+    work = np.where(number == 0, READ_TICKS + READ_JOINT_TICKS * moving[segment], SLICE_JOINT_TICKS * moving[segment])
+    work = work / np.maximum(1.0 - loads[segment], LEAST_SHARE)
+    freed = np.concatenate([np.full(PREPARED_SLICES - 1, starts[0] - MIN_LEAD_TICKS), starts])[: len(starts)]
+    begun = np.maximum(starts - MIN_LEAD_TICKS, freed)
+    until = np.cumsum(work)
+    ahead = starts - until - np.maximum.accumulate(begun - (until - work))
+    k = int(ahead.argmin())
+    return float(ahead[k]), int(segment[k])
 
 
 def _begun_before(table: SegmentTable) -> Ticks:
