@@ -33,3 +33,13 @@ def test_tasks_at_full_stretch_are_planned_to_a_green_certificate(start, goal):
     assert plan.certificate.ok, plan.certificate.explain()
     q = plan.trajectory.q_rad[[0, -1], 1]
     assert np.abs(q).min() == pytest.approx(0.0, abs=1e-6)
+
+
+def test_a_plan_that_is_slowed_down_for_its_stops_tells_each_try():
+    slow = [replace(joint, max_acceleration_rad_s2=0.25 * joint.max_acceleration_rad_s2) for joint in CASE_1.joints]
+    told = []
+    plan_scene(replace(CASE_1, joints=tuple(slow)), lambda stage, share: told.append((stage, share)))
+    shares = [share for _, share in told]
+    assert {stage for stage, _ in told} == {"plan"}
+    assert shares == sorted(shares) and (shares[0], shares[-1]) == (0.0, 1.0)
+    assert sum(0.6 < share < 0.8 for share in shares) >= 2

@@ -36,7 +36,9 @@ def encode(scene: Scene, trajectory: Trajectory, coding: Coding | None = None) -
     return train, replace(plan, allowances=allowances(trajectory, scene, durations))
 
 
-def schedule(scene: Scene, timing: Timing) -> tuple[Trajectory, StepTrain, SegmentPlan]:
+def schedule(
+    scene: Scene, timing: Timing, told: Callable[[float], None] = lambda _share: None
+) -> tuple[Trajectory, StepTrain, SegmentPlan]:
     """Return a motion from which the device can come to rest on the path at any moment, its steps and its segments.
 
     Where no speed makes all stops fit, as with all of the acceleration used, the last try is returned; the certificate
@@ -45,12 +47,13 @@ def schedule(scene: Scene, timing: Timing) -> tuple[Trajectory, StepTrain, Segme
     Args:
         scene: the joints, their motors and limits.
         timing: times the path under a further limit of the speed along it.
+        told: told the share of the tries that may be needed, before each; most motions need few.
 
     Raises:
         TimingError: a joint would have to step faster than the firmware can.
     """
     coding = Coding.of(motor_axes(scene.joints, scene.coupling))
-    return _until_stops_fit(scene, timing, lambda trajectory: encode(scene, trajectory, coding), 0)
+    return _until_stops_fit(scene, timing, lambda trajectory: encode(scene, trajectory, coding), 0, told)
 
 
 def go_on(
@@ -104,12 +107,17 @@ def with_first_steps(old: StepTrain, made: Sequence[int], new: StepTrain) -> Ste
 
 
 def _until_stops_fit(
-    scene: Scene, timing: Timing, encoded: Callable[[Trajectory], tuple[StepTrain, SegmentPlan]], first: int
+    scene: Scene,
+    timing: Timing,
+    encoded: Callable[[Trajectory], tuple[StepTrain, SegmentPlan]],
+    first: int,
+    told: Callable[[float], None] = lambda _share: None,
 ) -> tuple[Trajectory, StepTrain, SegmentPlan]:
     """Time and encode, slower until the device holds the path of every stop from segment `first` on."""
     limit: SpeedLimit | None = None
     road: Road | None = None
     for left in range(MOST_ROUNDS, 0, -1):
+        told(1.0 - left / MOST_ROUNDS)
         trajectory = timing(limit)
         lower = None if road is None or left == 1 else slower(trajectory, scene, road, limit)
         if lower is not None:
