@@ -23,7 +23,7 @@ from planarm.errors import (
 from planarm.link.arm_record import ArmSetup
 from planarm.link.positions import Positions, default_path
 from planarm.link.stream import StreamProgress
-from planarm.link.transport import open_transport, require_board
+from planarm.link.transport import open_transport, require_port
 from planarm.model.arm import Arm
 from planarm.motions.margin import planning_margin_cm
 from planarm.motions.motion import motion_along, tip_curve_cm
@@ -165,7 +165,7 @@ def run_scene(
         PlanarmError: the branch of the tree tells which stage failed. Differing steps are reported first, then raised.
             When the stream failed, its notes tell what the emulated arm did, and the folder is complete all the same.
     """
-    require_board(port, scene.board)
+    require_port(port, scene.board)
     plan = plan_scene(scene, notice)
     begin_run_folder(out, stored(plan))
     setup = ArmSetup(scene, plan.segments.start_usteps, faults, fault_seed)

@@ -213,6 +213,8 @@ def test_flashing_says_what_is_missing_and_what_avrdude_said(tmp_path):
     with pytest.raises(LinkError, match="no such flash image"):
         flash("/dev/ttyACM0", image)
     image.write_text("")
+    with pytest.raises(LinkError, match=r"port sim://: flashing needs a board's own device"):
+        flash("sim://", image)
     with pytest.raises(LinkError, match="no-such-tool is not installed"):
         flash("/dev/ttyACM0", image, "no-such-tool")
     refused = subprocess.CompletedProcess([], 1, "", "avrdude: stk500_getsync(): not in sync\n")

@@ -205,3 +205,16 @@ def test_the_emulators_bridge_passes_a_session_on():
         assert line.clock.now_s() % 4.096e-3 < 0.5e-3, "it came with a tick of the bridge's timer"
         (frame,) = FrameDecoder().feed(answer)
         assert decode(frame.type_code, frame.payload).host_nonce == 7
+
+
+@pytest.mark.parametrize("command", ["run", "replan"])
+def test_a_device_that_is_not_there_is_told_before_anything_is_planned(command, tmp_path, capsys):
+    arrivals = tmp_path / "later.toml"
+    arrivals.write_text('[[obstacles]]\nshape = "circle"\ncenter_cm = [0, 40]\ndiameter_cm = 2\nat_s = 0.5\n')
+    more = ["--arrivals", str(arrivals)] if command == "replan" else []
+    with pytest.raises(SystemExit) as left:
+        main([command, str(EXAMPLES / "energy_two_links.toml"), *more, "--port", "/dev/tty-none"])
+    said = capsys.readouterr().err
+    assert left.value.code == 5
+    assert "port /dev/tty-none: not found" in said
+    assert "plan:" not in said and "kernels" not in said

@@ -17,8 +17,7 @@ def execute(options: argparse.Namespace) -> int:
     from planarm.link.transport import open_transport
 
     image = Path(options.image) if options.image else released_image(options.board)
-    let_go(options.port)
-    flash(options.port, image)
+    flash(options.port, image, prepare=let_go)
     told: dict[str, object] = {"image": str(image), "verified": True}
     if not options.image:
         with closing(open_transport(options.port)) as transport:

@@ -25,14 +25,14 @@ def execute(options: argparse.Namespace) -> int:
     from contextlib import closing
 
     from planarm.link.arm_record import ArmSetup
-    from planarm.link.transport import open_transport, require_board
+    from planarm.link.transport import open_transport, require_port
     from planarm.operations.arrivals import Listed, Watched
     from planarm.operations.replanning import first_plan, run_live
     from planarm.scene.arrivals import load_arrivals
     from planarm.warm_up import warm_up
 
     port = scene.link.port if options.port is None else options.port
-    require_board(port, scene.board)
+    require_port(port, scene.board)
     source = Watched(Path(options.watch)) if options.watch else Listed(load_arrivals(Path(options.arrivals)))
     with progress(options.json) as notice:
         notice("kernels", 0.0)

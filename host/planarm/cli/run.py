@@ -22,10 +22,10 @@ def execute(options: argparse.Namespace) -> int:
     require_folder_place(out)
     if options.faults:
         require_file(options.faults, EmulatorError, "give the path of a schedule of faults (docs/faults.md)")
-    from planarm.link.transport import require_board
+    from planarm.link.transport import require_port
 
     port = scene.link.port if options.port is None else options.port
-    require_board(port, scene.board)
+    require_port(port, scene.board)
     compile_first("planarm", "planarm_sim")
     from planarm.pipeline import run_scene
     from planarm.warm_up import warm_up

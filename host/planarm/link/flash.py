@@ -19,7 +19,13 @@ def run_tool(words: Sequence[str]) -> "subprocess.CompletedProcess[str]":
     return subprocess.run(words, capture_output=True, text=True, timeout=LIMIT_S, check=False)
 
 
-def flash(port: str, image: Path, tool: str = "avrdude", run: Runner = run_tool) -> None:
+def flash(
+    port: str,
+    image: Path,
+    tool: str = "avrdude",
+    run: Runner = run_tool,
+    prepare: Callable[[str], None] = lambda _port: None,
+) -> None:
     """Write `image` (Intel HEX) through the boot loader at `port`; avrdude reads it back and compares.
 
     Args:
@@ -27,15 +33,19 @@ def flash(port: str, image: Path, tool: str = "avrdude", run: Runner = run_tool)
         image: the flash image.
         tool: avrdude.
         run: runs a program.
+        prepare: has the board reset when the port is opened next.
 
     Raises:
         LinkError: there is no avrdude, or it failed; the message has its last words.
     """
+    if "://" in port:
+        raise LinkError(f"port {port}: flashing needs a board's own device, such as /dev/ttyACM0; give that")
     if not image.is_file():
         raise LinkError(f"{image}: no such flash image; leave --image out for the released one")
     found = shutil.which(tool)
     if found is None:
         raise LinkError(f"{tool} is not installed; install it (Debian: avrdude, macOS: brew install avrdude)")
+    prepare(port)
     words = [found, "-q", "-p", "atmega328p", "-c", "arduino", "-P", port, "-b", str(BOOTLOADER_BAUD), "-D"]
     try:
         ended = run([*words, "-U", f"flash:w:{image}:i"])

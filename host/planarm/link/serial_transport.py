@@ -98,11 +98,16 @@ def _open(url: str, baud: int) -> serial.SerialBase:
         raise LinkError(_why_not_opened(url, baud, error)) from error
 
 
+def not_found(url: str) -> str:
+    """Say that there is no such port, and which there are."""
+    found = ", ".join(port.device for port in serial.tools.list_ports.comports()) or "none"
+    return f"port {url}: not found; serial ports found here: {found}"
+
+
 def _why_not_opened(url: str, baud: int, error: Exception) -> str:
     code = getattr(error, "errno", None)
     if code in (errno.ENOENT, errno.ENODEV, errno.ENXIO):
-        found = ", ".join(port.device for port in serial.tools.list_ports.comports()) or "none"
-        return f"port {url}: not found; serial ports found here: {found}"
+        return not_found(url)
     if code in (errno.EACCES, errno.EPERM):
         return f"port {url}: permission denied; {_how_to_get_permission(url)}"
     if code in (errno.EBUSY, errno.EAGAIN, errno.EWOULDBLOCK):
