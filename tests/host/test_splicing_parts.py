@@ -2,6 +2,7 @@
 
 import re
 from dataclasses import replace
+from itertools import islice
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +18,7 @@ from planarm.model.transmission import motor_axes
 from planarm.motions.margin import planning_margin_cm
 from planarm.operations.replanning import first_plan
 from planarm.operations.splicing import Border, first_border, plan_from_border, why_not
+from planarm.operations.tails import is_rounded, tails_along_tangents
 from planarm.smoothing.joint_spline import part_of, run_on, scaled
 from planarm.stepping.certify import certify
 from planarm.stepping.schedule import with_first_steps
@@ -24,6 +26,8 @@ from planarm.stepping.segments import Coding, compress, expand
 from planarm.trajectory.jerk import STEP_S, largest_jerks, mean_of
 from planarm.trajectory.limits import Limits
 from planarm.trajectory.timing import fastest_motion
+from planarm.workspace.joint_proof import joint_world, prove_pieces
+from planarm.workspace.proof import PROVED
 from planarm_wire.messages import SLICE_TICKS, STARVING_TICKS, TICKS_HZ
 from planarm_wire.steps import duration_ticks
 
@@ -98,7 +102,7 @@ def test_a_motion_with_other_first_steps_is_refused(plan):
         with_first_steps(train, [0, 3], turned)
 
 
-@pytest.mark.parametrize("ready_s", [0.05, 0.3, 0.7, 1.1])
+@pytest.mark.parametrize("ready_s", [0.05, 0.2, 0.4, 0.6])
 def test_a_border_leaves_the_device_enough_until_the_other_motion_is_there(plan, ready_s):
     """The firmware's own rule, slice by slice: no slice that it prepares by then is starving, with 15 ms to spare."""
     border = first_border(plan, 0, ready_s)
@@ -154,7 +158,34 @@ def test_a_scaled_path_is_the_same_path(plan):
     assert np.abs(state.ddq_rad - 9.0 * wanted.ddq_rad).max() < 1e-7
 
 
-@pytest.mark.parametrize("scene", [with_jerk(SCENE, 250.0), by_time(SCENE, 0.2)], ids=["jerk", "time"])
+@pytest.mark.parametrize("at", [0.1, 0.35, 0.6])
+def test_ways_along_tangents_leave_any_path_without_a_corner(first, at):
+    """They begin where the path is left, in its direction and at its rate, are free, and end at the goal."""
+    task, plan = first
+    path, world = plan.trajectory.path, joint_world(SCENE, planning_margin_cm(SCENE))
+    stretched = scaled(path, 2.5)  # dq/ds of another length
+    at_s = at * float(stretched.borders_s[-1])
+    found = list(islice(tails_along_tangents(SCENE, task, stretched, at_s, world), 4))
+    assert found
+    left = stretched.evaluate(np.array([at_s]))
+    for tail in found:
+        begin = tail.path.evaluate(np.zeros(1))
+        assert begin.q_rad == pytest.approx(left.q_rad, abs=1e-9)
+        assert begin.dq_rad == pytest.approx(left.dq_rad, abs=1e-9)
+        end = tail.path.evaluate(tail.path.borders_s[-1:], "left").q_rad[0]
+        assert end == pytest.approx(np.array(SCENE.task.goal_rad), abs=1e-9)
+        assert prove_pieces(world, tail.path.borders_s, tail.path.coefficients)[0] == PROVED
+        inner = tail.path.borders_s[1:-1]
+        turns = tail.path.evaluate(inner, "left").dq_rad - tail.path.evaluate(inner).dq_rad
+        assert np.abs(turns).max(initial=0.0) < 1e-9
+    assert not is_rounded(stretched, plan.joint.poses_rad)
+    assert is_rounded(path, plan.joint.poses_rad)
+
+
+IN_THE_WAY = by_time(replace(SCENE, obstacles=(circle(8.4, 40.6, 6.0),)), 0.2)
+
+
+@pytest.mark.parametrize("scene", [with_jerk(SCENE, 250.0), IN_THE_WAY], ids=["jerk", "time"])
 def test_other_motions_are_left_at_speed_and_acceleration(scene):
     """Around an obstacle: certified, the same up to the border, without a jump of speed, with limits of jerk of
     acceleration either; and where nothing leads on it says so."""
@@ -163,7 +194,7 @@ def test_other_motions_are_left_at_speed_and_acceleration(scene):
     obstacle = circle(*tip_at(plan, 0.8), 2.0)
     _, changes = task.roadmap.add_obstacle(shape_of(obstacle))
     task.planner.change(changes)
-    among = replace(scene, obstacles=(obstacle,))
+    among = replace(scene, obstacles=(*scene.obstacles, obstacle))
     other = plan_from_border(among, task, plan, border, 0.0, margin_cm)
     assert other.certificate.ok
     assert not certify(among, plan.trajectory, plan.train, plan.segments).ok

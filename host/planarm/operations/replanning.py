@@ -42,7 +42,7 @@ from planarm.operations.splicing import Border, borders_from, first_border, plan
 from planarm.operations.verdicts import Verdict, contact_time_s, judge_contact, whereabouts_s
 from planarm.pipeline import plan_scene
 from planarm.plan import Plan
-from planarm.roadmap.planning import RoadmapTask, way_from
+from planarm.roadmap.planning import RoadmapTask, shorter_way, way_from
 from planarm.routes.route import route_through
 from planarm.scene import Obstacle, Scene
 from planarm.streaming.plan_stream import options_for
@@ -345,8 +345,9 @@ def first_plan(scene: Scene, notice: Notice) -> tuple[RoadmapTask, Plan]:
     answer = task.planner.solve()
     if not len(answer.nodes):
         raise task.no_way(scene)
-    poses = task.roadmap.poses_rad[answer.nodes]
-    return task, plan_scene(scene, notice, route_through(scene, margin_cm, poses, answer.cost))
+    way = task.roadmap.poses_rad[answer.nodes]
+    poses, cost = shorter_way(task.roadmap, joint_world(scene, margin_cm), way, answer.cost)
+    return task, plan_scene(scene, notice, route_through(scene, margin_cm, poses, cost))
 
 
 def plan_from(scene: Scene, task: RoadmapTask, rest_rad: Floats, notice: Notice) -> Plan:
@@ -356,10 +357,11 @@ def plan_from(scene: Scene, task: RoadmapTask, rest_rad: Floats, notice: Notice)
         NoPathError: the arm rests too near to an obstacle, or nothing joins it with the goal any more.
     """
     margin_cm = planning_margin_cm(scene)
-    found = way_from(task, joint_world(scene, margin_cm), rest_rad)
+    world = joint_world(scene, margin_cm)
+    found = way_from(task, world, rest_rad)
     if found is None:
         raise NoPathError(f"{scene.source}: no way leads on from {_pose_words(scene, rest_rad)} to the goal")
-    poses, cost = found
+    poses, cost = shorter_way(task.roadmap, world, *found)
     x, y = forward(Arm.from_spec(scene.arm), rest_rad)[-1]
     start = replace(scene.task, start_cm=(float(x), float(y)), start_rad=tuple(map(float, rest_rad)))
     from_here = replace(scene, task=start)

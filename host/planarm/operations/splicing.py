@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from planarm.errors import CertificateError, NoPathError, PlanarmError, TimingError
-from planarm.operations.tails import Tail, tails_along_tangents, tails_at_corners
+from planarm.operations.tails import MOST_TAILS, Tail, tails
 from planarm.plan import Plan
 from planarm.roadmap.planning import RoadmapTask
 from planarm.routes.gentle import ROOM_CM, gentle_rest, jerk_limits
@@ -201,12 +201,8 @@ def _timed_tails(
     limits, route = Limits.of(scene), before.joint
     by_time = scene.planner.objective == "time"
     assert route is not None, "`why_not` said so"
-    if by_time:
-        tails = tails_along_tangents(scene, task, left.path, left.s, world)
-    else:
-        tails = tails_at_corners(scene, task, left.path, route.poses_rad, left.s, world)
     timed: list[tuple[float, Tail]] = []
-    for tail in tails:
+    for tail in tails(scene, task, left.path, route.poses_rad, left.s, world):
         try:
             duration_s = fastest_motion(tail.path, limits, start_rate=left.rate).duration_s
         except TimingError as error:
@@ -214,6 +210,8 @@ def _timed_tails(
             continue
         if by_time:
             timed.append((duration_s, tail))
+            if len(timed) == MOST_TAILS:
+                break
         else:
             yield tail
     yield from (tail for _, tail in sorted(timed, key=lambda one: one[0]))

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from math import ceil
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from planarm.model.arm import Arm
-from planarm.roadmap.planning import RoadmapTask, ways_on
+from planarm.roadmap.planning import RoadmapTask, cost_of, shorter_way, ways_on
 from planarm.scene import Scene
 from planarm.smoothing.joint_blend import blend_poses
 from planarm.smoothing.joint_spline import JointSpline, part_of, run_on, scaled
@@ -22,12 +21,15 @@ Floats = NDArray[np.float64]
 
 MOST_CORNERS = 6
 """Corners of the old way up to which it may be left."""
-BETWEEN_RAD = 0.15
-"""Between corners it may be left about so often."""
-MOST_PLACES = 4
-"""Places on a curve from which its tangent is followed."""
+PLACES_RAD = (0.15, 0.3, 0.45, 0.65, 0.9, 1.2, 1.6, 2.1, 2.8)
+"""So far along the path it may be left, too: each place costs a question to the search."""
+NEAR_RAD = 0.08
+"""Not so near to a corner."""
+ROUNDING_RAD = 1e-9
 REACHES_RAD = (0.2, 0.45, 0.8)
-"""How far."""
+"""How far a path's tangent is followed."""
+MOST_TAILS = 6
+"""Of the ways along tangents that lead on and can be begun at the speed, the first ones."""
 PLACE_SAMPLES = 200
 SHOWN_POSES = 8
 """By which what is past of a curve is told in reports."""
@@ -43,24 +45,44 @@ class Tail:
     cost: float
 
 
-def tails_at_corners(
+def tails(
     scene: Scene, task: RoadmapTask, path: JointSpline, poses_rad: Floats, at_s: float, world: JointWorld
 ) -> Iterator[Tail]:
-    """Yield ways that leave a rounded polyline at one of its next corners or between them, the cheapest first.
+    """Yield ways that leave a path from a parameter on, among all obstacles of a scene.
 
     Args:
         scene: with all obstacles.
         task: the roadmap with all of them, and its planner.
-        path: the polyline of `poses_rad`, shape (m, n), with its corners rounded.
-        poses_rad: see there.
+        path: the path.
+        poses_rad: the way that it was made of, shape (m, n).
         at_s: the path parameter from which on it may be left.
         world: the arm among all obstacles.
     """
+    if is_rounded(path, poses_rad):
+        return tails_at_corners(scene, task, path, poses_rad, at_s, world)
+    return tails_along_tangents(scene, task, path, at_s, world)
+
+
+def is_rounded(path: JointSpline, poses_rad: Floats) -> bool:
+    """Tell whether a path is a polyline with its corners rounded, its parameter the way along that."""
+    legs = np.linalg.norm(np.diff(poses_rad, axis=0), axis=1)
+    ends_s = np.cumsum(legs)
+    if not len(legs) or abs(ends_s[-1] - path.borders_s[-1]) > ROUNDING_RAD:
+        return False
+    middles = 0.5 * (poses_rad[:-1] + poses_rad[1:])
+    return bool(np.abs(path.evaluate(ends_s - 0.5 * legs).q_rad - middles).max() < ROUNDING_RAD)
+
+
+def tails_at_corners(
+    scene: Scene, task: RoadmapTask, path: JointSpline, poses_rad: Floats, at_s: float, world: JointWorld
+) -> Iterator[Tail]:
+    """Yield ways that leave a rounded polyline at one of its next corners or between them, the cheapest first."""
     ahead = _ahead(path, poses_rad, at_s, world)
     ways = ways_on(task, world, np.array(ahead.poses_rad)) if ahead.poses_rad else []
-    for cost, k, way in ways:
+    for whole, k, found in ways:
         straight_s = _straight_from(path, max(at_s, ahead.leg_s[k]))
         if straight_s < ahead.s[k]:
+            way, cost = _shorter(task, world, found, whole)
             turned = _turned(path.evaluate(np.array([straight_s])).q_rad[0], way, scene, world)
             rest = turned if straight_s == at_s else run_on([part_of(path, at_s, straight_s), turned])
             yield Tail(rest, np.concatenate([poses_rad[: ahead.corner[k]], way]), cost)
@@ -69,10 +91,7 @@ def tails_at_corners(
 def tails_along_tangents(
     scene: Scene, task: RoadmapTask, path: JointSpline, at_s: float, world: JointWorld
 ) -> Iterator[Tail]:
-    """Yield ways that leave any path along its tangent, from some places on it, and turn into a way from there.
-
-    Arguments as `tails_at_corners`.
-    """
+    """Yield ways that leave any path along its tangent, from some places on it, and turn into a way from there."""
     end_s = float(path.borders_s[-1])
     old = np.linspace(0.0, at_s, SHOWN_POSES)
     for left_s in _places(path, at_s, end_s):
@@ -84,17 +103,25 @@ def tails_along_tangents(
             there = pose + reach_rad / rate * state.dq_rad[0]
             if prove_joint_line(world, pose, there)[0] != PROVED:
                 break
-            for cost, _, way in ways_on(task, world, there[None]):
+            for whole, _, found in ways_on(task, world, there[None]):
+                way, cost = _shorter(task, world, found, whole)
                 turned = scaled(_turned(pose, way, scene, world), rate)
                 rest = turned if left_s == at_s else run_on([part_of(path, at_s, left_s), turned])
                 yield Tail(rest, np.concatenate([path.evaluate(old).q_rad, pose[None], way]), cost)
 
 
+def _shorter(task: RoadmapTask, world: JointWorld, way: Floats, cost: float) -> tuple[Floats, float]:
+    """Return a way made shorter, and what the whole costs then; in one round, since the arm moves meanwhile."""
+    own = cost_of(task.roadmap, way)
+    poses, less = shorter_way(task.roadmap, world, way, own, rounds=1)
+    return poses, cost - own + less
+
+
 def _places(path: JointSpline, at_s: float, end_s: float) -> list[float]:
-    """Return where a path may be left: at once, and about every BETWEEN_RAD of its travel."""
+    """Return where a path may be left: at once, and after some of its travel."""
     s = np.linspace(at_s, end_s, PLACE_SAMPLES)
     travel = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(path.evaluate(s).q_rad, axis=0), axis=1))])
-    wanted = BETWEEN_RAD * np.arange(MOST_PLACES)
+    wanted = np.array((0.0, *PLACES_RAD))
     return [float(one) for one in np.interp(wanted[wanted < travel[-1]], travel, s)]
 
 
@@ -118,25 +145,23 @@ class _Ahead(NamedTuple):
 def _ahead(path: JointSpline, poses: Floats, at_s: float, world: JointWorld) -> _Ahead:
     """Return where an old way may be left, as far as its legs are still free."""
     corners_s = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(poses, axis=0), axis=1))])
-    first = int(np.searchsorted(corners_s, at_s))
-    start = path.evaluate(np.array([at_s])).q_rad[0]
-    found = _Ahead([], [], [], [])
-    for k in range(first, min(first + MOST_CORNERS, len(poses))):
-        leg = poses[k] - poses[k - 1]
-        parts = max(1, ceil(float(np.linalg.norm(leg)) / BETWEEN_RAD))
-        since = start if k == first else poses[k - 1]
-        for part in range(1, parts + 1):
-            pose = poses[k] if part == parts else poses[k - 1] + part / parts * leg
-            s = float(corners_s[k - 1] + part / parts * (corners_s[k] - corners_s[k - 1]))
-            if s <= at_s:
-                continue
-            if (k == len(poses) - 1 and part == parts) or prove_joint_line(world, since, pose)[0] != PROVED:
-                return found
-            since = pose
-            found.poses_rad.append(pose)
-            found.s.append(s)
-            found.leg_s.append(float(corners_s[k - 1]))
-            found.corner.append(k)
+    start, end_s = path.evaluate(np.array([at_s])).q_rad[0], float(corners_s[-1])
+    corners = corners_s[(corners_s > at_s) & (corners_s < end_s)][:MOST_CORNERS]
+    between = at_s + np.array(
+        [away for away in PLACES_RAD if np.abs(at_s + away - corners).min(initial=1.0) > NEAR_RAD]
+    )
+    found, since = _Ahead([], [], [], []), start
+    for s in np.sort(np.concatenate([corners, between[between < end_s]])):
+        k = int(np.searchsorted(corners_s, s - ROUNDING_RAD))
+        leg = corners_s[k] - corners_s[k - 1]
+        pose = poses[k - 1] + (s - corners_s[k - 1]) / leg * (poses[k] - poses[k - 1])
+        if prove_joint_line(world, since, pose)[0] != PROVED:
+            return found
+        since = pose
+        found.poses_rad.append(pose)
+        found.s.append(float(s))
+        found.leg_s.append(float(corners_s[k - 1]))
+        found.corner.append(k)
     return found
 
 

@@ -13,6 +13,7 @@ from planarm.model.arm import Arm
 from planarm.model.kinematics import ElbowSide, inverse_2r
 from planarm.roadmap.graph import KINDS, Roadmap
 from planarm.roadmap.moves import are_free
+from planarm.roadmap.shortening import ROUNDS, shortened
 from planarm.scene import EdgeCost, Point, Scene
 from planarm.search.digraph import bound
 from planarm.search.incremental import GraphAlgorithm, GraphAnswer, GraphPlanner
@@ -72,9 +73,30 @@ class RoadmapTask:
 
 
 def joint_route_of(scene: Scene, roadmap: Roadmap, answer: GraphAnswer) -> JointRoute:
-    """Return a way on a roadmap as a way in joint space."""
+    """Return a way on a roadmap as a way in joint space, made shorter."""
     bounded = bound(roadmap.bounds(), int(answer.nodes[0]), int(answer.nodes[-1]))
-    return made_route(scene, roadmap.poses_rad[answer.nodes], OBJECTIVES[roadmap.cost], answer.cost, bounded)
+    poses, cost = shorter_way(roadmap, roadmap.world, roadmap.poses_rad[answer.nodes], answer.cost)
+    return made_route(scene, poses, OBJECTIVES[roadmap.cost], cost, bounded)
+
+
+def shorter_way(
+    roadmap: Roadmap, world: JointWorld, poses_rad: Floats, cost: float, rounds: int = ROUNDS
+) -> tuple[Floats, float]:
+    """Return a way on a roadmap with its detours taken out (`planarm.roadmap.shortening`), and what it costs.
+
+    Args:
+        roadmap: it.
+        world: the arm among all obstacles.
+        poses_rad: a way by free moves, shape (m, n).
+        cost: what it costs.
+        rounds: as there.
+    """
+    return shortened(world, roadmap.model, KINDS[roadmap.cost], poses_rad, cost, rounds)
+
+
+def cost_of(roadmap: Roadmap, poses_rad: Floats) -> float:
+    """Return what a way through configurations, shape (m, n), costs."""
+    return sum(edge_costs(roadmap.model, KINDS[roadmap.cost], a, b)[0] for a, b in pairwise(poses_rad))
 
 
 def ends_rad(scene: Scene, world: JointWorld) -> tuple[Floats, Floats]:
