@@ -18,6 +18,7 @@ from planarm.errors import (
     DeviceFault,
     HostKilledError,
     LinkError,
+    OutputError,
     StepsDifferError,
 )
 from planarm.link.arm_record import ArmSetup
@@ -48,6 +49,11 @@ from planarm.trajectory.binding import report_timing
 from planarm.trajectory.limits import Limits
 from planarm.trajectory.motion import Trajectory
 from planarm.workspace.free_map import build_free_map
+
+LEFT_BEHIND = (
+    "the arm follows its path until the board's queue runs dry and rests there; the board knows where: 'planarm status'"
+)
+"""What becomes of a motion whose journal cannot be written any more."""
 
 SETTLE_AFTER_FAILURE_S = 1.0
 """Emulated time after a stream that failed: what the board has queued is executed, and the arm comes to rest."""
@@ -188,6 +194,10 @@ def run_scene(
                 error.add_note(line)
             figures = {**planned_figures(plan), **seen_figures(seen.findings, seen.arm)}
             finish_run_folder(out, Outcome(plan, figures, tuple(log.samples), seen, error.told(), log.resent))
+            raise
+        except OutputError as error:
+            if log.samples:
+                error.add_note(LEFT_BEHIND)
             raise
         seen = look_at(plan, transport, 0.0, kept)
     summary = summarise(plan, streamed, seen.findings, seen.arm) | (kept.figures() if kept else {})

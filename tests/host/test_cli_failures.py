@@ -123,3 +123,17 @@ def test_a_goal_that_is_the_start_is_done_at_once(capsys, tmp_path):
     code, out, _ = leave(capsys, "run", scene, "--out", tmp_path / "out", "--json")
     told = json.loads(out)
     assert (code, told["segments"], told["net_usteps"], told["steps_at_pins"]) == (0, 0, [0, 0], [0, 0])
+
+
+def test_a_disk_that_gets_full_in_a_motion_is_told_with_what_the_arm_does(capsys, tmp_path, monkeypatch):
+    written, write = [], os.write
+
+    def cut(file, data):
+        written.append(len(data))
+        return write(file, data if len(written) < 120 else data[:1])
+
+    monkeypatch.setattr("planarm.link.journal.os.write", cut)
+    code, _, err = leave(capsys, "run", CASE_1, "--out", tmp_path / "out")
+    assert code == 2
+    assert "run.journal: only 1 of" in err and "make room on the disk" in err
+    assert "rests there; the board knows where: 'planarm status'" in err
