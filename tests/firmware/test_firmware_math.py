@@ -26,7 +26,6 @@ CYCLES = {
     "multiply_q16": (165, 169),
     "multiply_q32": (165, 169),
     "add_to": (39, 39),
-    "subtract_from": (39, 39),
     "divide_q16": (685, 717),
 }
 
