@@ -373,6 +373,7 @@ def draw_growth(target: Path) -> None:
     left.set_xlabel("free nodes of the map")
     left.set_ylabel("ms of CPU")
     right.set_xlabel("neighbours, cells of 1 mm")
+    right.set_ylabel("ms of CPU")
     right.set_ylim(bottom=0.0)
     for axes in (left, right):
         dress(axes)

@@ -16,7 +16,14 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Final
 
-from planarm_wire.messages import HOST_WINDOW_BYTES, NEED_UNIT_TICKS, TICKS_HZ
+from planarm_wire.messages import (
+    CRC_BYTES,
+    HEADER_BYTES,
+    HOST_WINDOW_BYTES,
+    NEED_UNIT_TICKS,
+    QUEUE_FRAME_BYTES,
+    TICKS_HZ,
+)
 
 RATE_UNIT_PER_S: Final = TICKS_HZ / 2**32
 """What v = 1 means, 0.0037 1/s."""
@@ -24,6 +31,12 @@ MAX_CODE: Final = 0xFF
 MANTISSAS: Final = 16
 MESSAGE_SEGMENTS: Final = 2
 """Most segments that hosts put into one message: its head, the least of their allowances, holds for all of them."""
+SEGMENTS_HEAD_BYTES: Final = 3
+"""The head of a message of segments: slow, fast and need."""
+QUEUED_HEAD_BYTES: Final = SEGMENTS_HEAD_BYTES + QUEUE_FRAME_BYTES
+"""What the device's queue keeps of a message besides its segments: its head, and its length."""
+SEGMENTS_FRAME_BYTES: Final = HEADER_BYTES + SEGMENTS_HEAD_BYTES + 2 * CRC_BYTES + 1
+"""What the line carries of a message besides its segments: header, head, checks and delimiter; no stuffed bytes."""
 SHARED_PAYLOAD_BYTES: Final = HOST_WINDOW_BYTES // 2 - 8
 """Longest payload of a message with several segments: its frame takes half of the window. One segment may take more."""
 

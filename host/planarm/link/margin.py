@@ -25,20 +25,16 @@ from planarm_wire.messages import (
     MAX_PAYLOAD_BYTES,
     MIN_LEAD_TICKS,
     NEED_UNIT_TICKS,
-    QUEUE_FRAME_BYTES,
     SLICE_TICKS,
     STARVING_TICKS,
     TICKS_HZ,
     Segment,
 )
-from planarm_wire.rates import Allowance
+from planarm_wire.rates import MESSAGE_SEGMENTS, QUEUED_HEAD_BYTES, SEGMENTS_FRAME_BYTES, Allowance
 from planarm_wire.steps import duration_ticks, step_count
 
-FRAME_BYTES = 13
-"""Header, two CRCs, delimiter, the head of SEGMENTS, and a byte in fifty stuffed."""
-QUEUED_HEAD_BYTES = 3 + QUEUE_FRAME_BYTES
-"""A message's head in the queue: slow, fast, need, and its length."""
-SEGMENTS_A_FRAME = 2
+FRAME_BYTES = SEGMENTS_FRAME_BYTES + 2
+"""With a byte in fifty stuffed."""
 USABLE_SHARE = 0.9
 """Of what was seen: a line has bad moments."""
 QUESTIONS_BYTES_S = 140.0
@@ -149,7 +145,7 @@ class _Supply:
         durations = [duration_ticks(segment) for segment in segments]
         self.starts = list(accumulate(durations, initial=0))
         self._sent, self._seen = sent, seen
-        self._line_bytes = [size + FRAME_BYTES / SEGMENTS_A_FRAME for size in sizes]
+        self._line_bytes = [size + FRAME_BYTES / MESSAGE_SEGMENTS for size in sizes]
         self._queued = list(accumulate(map(_queued_bytes, segments), initial=0.0))
         self._needs = [NEED_UNIT_TICKS * -(-one.need_ticks // NEED_UNIT_TICKS) for one in allowances]
         self._needs = self._needs or [0.0] * len(segments)
@@ -191,7 +187,7 @@ class _Supply:
 
 
 def _queued_bytes(segment: Segment) -> float:
-    return encoded_bytes(segment) + QUEUED_HEAD_BYTES / SEGMENTS_A_FRAME
+    return encoded_bytes(segment) + QUEUED_HEAD_BYTES / MESSAGE_SEGMENTS
 
 
 def _work_ticks(board: Board, joints: int, segment: Segment, ticks: int) -> float:

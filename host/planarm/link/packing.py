@@ -8,10 +8,16 @@ from collections.abc import Sequence
 from planarm.link.session import Session
 from planarm_wire.codec import encoded_bytes
 from planarm_wire.messages import HOST_WINDOW_BYTES, Segment, Segments
-from planarm_wire.rates import MESSAGE_SEGMENTS, NO_ALLOWANCE, SHARED_PAYLOAD_BYTES, Allowance, head_of
+from planarm_wire.rates import (
+    MESSAGE_SEGMENTS,
+    NO_ALLOWANCE,
+    SEGMENTS_HEAD_BYTES,
+    SHARED_PAYLOAD_BYTES,
+    Allowance,
+    head_of,
+)
 
 FRAME_BYTES = HOST_WINDOW_BYTES // 2
-HEAD_BYTES = 3  # slow, fast and need of a SEGMENTS message
 
 
 class Packer:
@@ -71,7 +77,7 @@ class Packer:
         self._message = None
 
     def _pack(self) -> Segments:
-        count, room_bytes = 0, SHARED_PAYLOAD_BYTES - HEAD_BYTES
+        count, room_bytes = 0, SHARED_PAYLOAD_BYTES - SEGMENTS_HEAD_BYTES
         for segment in self._segments[self.sent : min(self.until, self.sent + MESSAGE_SEGMENTS)]:
             room_bytes -= encoded_bytes(segment)
             if room_bytes < 0 and count:

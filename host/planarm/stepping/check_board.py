@@ -20,20 +20,15 @@ from planarm_wire.board_budget import (
     work_ticks,
 )
 from planarm_wire.messages import (
-    CRC_BYTES,
-    HEADER_BYTES,
     HOST_WINDOW_BYTES,
     MIN_LEAD_TICKS,
     SLICE_TICKS,
     TICKS_HZ,
 )
-from planarm_wire.rates import SHARED_PAYLOAD_BYTES
+from planarm_wire.rates import QUEUED_HEAD_BYTES, SEGMENTS_FRAME_BYTES, SHARED_PAYLOAD_BYTES
 
 BITS_PER_BYTE = 10
 """On the line: start bit, eight bits, stop bit."""
-
-QUEUED_HEAD_BYTES = 4.0
-"""A frame's head in the queue."""
 
 LOAD_WINDOW_TICKS = 80_000
 MOST_LOAD = 0.78
@@ -47,7 +42,6 @@ AMBER_LINE_SHARE = 0.4
 FLUSH_S = 0.0041
 """The Uno's USB bridge (ATmega16U2) keeps a reply for up to 4.1 ms."""
 REPLY_BYTES = 40
-SEGMENTS_HEAD_BYTES = 3
 
 
 def check_board(table: SegmentTable, made: StepTrain, link: LinkSpec) -> list[Check]:
@@ -84,8 +78,7 @@ def _share_of_frame(table: SegmentTable) -> Floats:
 
 def _frame_bytes(table: SegmentTable) -> Floats:
     """Return each segment's bytes on the line, with its share of a frame: header, head, checks and delimiter."""
-    frame = HEADER_BYTES + SEGMENTS_HEAD_BYTES + 2 * CRC_BYTES + 1
-    return np.asarray(segment_bytes(table), np.float64) + _share_of_frame(table) * frame
+    return np.asarray(segment_bytes(table), np.float64) + _share_of_frame(table) * SEGMENTS_FRAME_BYTES
 
 
 def _carried_bytes_s(link: LinkSpec) -> float:

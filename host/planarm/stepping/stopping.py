@@ -32,7 +32,7 @@ from planarm_wire.messages import (
     SLICE_TICKS,
     TICKS_HZ,
 )
-from planarm_wire.rates import MESSAGE_SEGMENTS, SHARED_PAYLOAD_BYTES
+from planarm_wire.rates import MESSAGE_SEGMENTS, QUEUED_HEAD_BYTES, SHARED_PAYLOAD_BYTES
 
 JUST_BEFORE_S = 1e-9
 """Accelerations jump at gridpoints; they are looked at on both sides."""
@@ -173,9 +173,6 @@ def path_time_to_rest(durations_s: Floats, slow_per_s: Floats, over_start_stop: 
     return needs
 
 
-HEAD_BYTES = 4
-"""What the device's queue keeps of a frame besides its segments: slow, fast, need and a length."""
-
 UNSURE_BYTES = MAX_PAYLOAD_BYTES + QUEUE_FRAME_BYTES
 """What may be empty of a full queue: less than the next message takes."""
 
@@ -185,8 +182,8 @@ def queued_bytes(segment_bytes: Ticks) -> Ticks:
 
     Two share a frame where both are short enough, stuffed bytes included; else each has its own.
     """
-    alone = MESSAGE_SEGMENTS * segment_bytes + HEAD_BYTES > SHARED_PAYLOAD_BYTES
-    return np.asarray(segment_bytes + np.where(alone, HEAD_BYTES, HEAD_BYTES // MESSAGE_SEGMENTS))
+    alone = MESSAGE_SEGMENTS * segment_bytes + QUEUED_HEAD_BYTES > SHARED_PAYLOAD_BYTES
+    return np.asarray(segment_bytes + np.where(alone, QUEUED_HEAD_BYTES, QUEUED_HEAD_BYTES // MESSAGE_SEGMENTS))
 
 
 def held_until(starts: Ticks, segment_bytes: Ticks, queue_bytes: int) -> Ticks:
