@@ -52,10 +52,12 @@ void Cursor::step() {
 
 // n I + n (n - 1) / 2 A further. A product with an A below 0 is 2^32 times the factor too large.
 void Cursor::skip(uint8_t steps) {
-    const uint16_t pairs = static_cast<uint16_t>(steps * (steps - 1u)) >> 1;
+    const uint8_t before = static_cast<uint8_t>(steps - 1);
+    const uint16_t pairs = static_cast<uint16_t>(static_cast<uint16_t>(steps) * before) >> 1;
     add_to(at_, multiply(interval_q16_, steps));
     add_to(at_, multiply(add_q16_, pairs));
-    if (static_cast<int32_t>(add_q16_) < 0) at_.high -= static_cast<uint32_t>(pairs) << 16;
+    if (static_cast<int32_t>(add_q16_) < 0)
+        increase(at_.high, static_cast<uint32_t>(static_cast<uint16_t>(0 - pairs)) << 16);
     increase(interval_q16_, multiply_low(add_q16_, steps));
 }
 

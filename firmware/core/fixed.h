@@ -10,6 +10,7 @@ namespace planarm {
 using hal::add_to;
 using hal::Fixed48;
 using hal::multiply;
+using hal::multiply_high;
 using hal::multiply_low;
 using hal::multiply_q16;
 using hal::multiply_q32;

@@ -24,8 +24,12 @@ struct Check {
     uint8_t joint_out;
 };
 
-QueueEnd queue_end;
-uint32_t queued_path_ticks;
+struct Queued {
+    uint32_t path_ticks;
+    QueueEnd end;
+};
+
+Queued queued;
 Check checked;
 
 // A segment of ENOUGH_TICKS takes six bytes at least.
@@ -43,23 +47,24 @@ uint32_t counted(uint32_t ticks) { return ticks < ENOUGH_TICKS ? ticks : ENOUGH_
 }  // namespace
 
 void reset(const step_engine::Position& position) {
+    Queued& at = hal::by_base(queued);
     for (uint8_t joint = 0; joint < wire::JOINTS; ++joint) {
-        queue_end.joints[joint] = {JointEnd::FOREVER, position.usteps[joint], false};
+        at.end.joints[joint] = {JointEnd::FOREVER, position.usteps[joint], false};
     }
-    queue_end.complete = false;
-    queued_path_ticks = 0;
+    at.end.complete = false;
+    at.path_ticks = 0;
 }
 
-void set_position(uint8_t joint, int32_t usteps) { queue_end.joints[joint].usteps = usteps; }
+void set_position(uint8_t joint, int32_t usteps) { queued.end.joints[joint].usteps = usteps; }
 
 wire::Result begin_check(const uint8_t* bytes, uint8_t length) {
-    if (queue_end.complete) return wire::Result::WRONG_STATE;
+    if (queued.end.complete) return wire::Result::WRONG_STATE;
     if (length > queue::free_bytes()) return wire::Result::BUSY;
     Check& at = hal::by_base(checked);
     if (length <= SEGMENTS_HEAD_BYTES) return wire::Result::MALFORMED;
     at.reader.begin(bytes + SEGMENTS_HEAD_BYTES, static_cast<uint8_t>(length - SEGMENTS_HEAD_BYTES));
     at.path_ticks = 0;
-    at.end = queue_end;
+    at.end = queued.end;
     at.joint_out = wire::JOINTS;
     return wire::Result::OK;
 }
@@ -91,15 +96,15 @@ uint8_t joint_out_of_limits() { return checked.joint_out; }
 
 void commit(const uint8_t* bytes, uint8_t length) {
     queue::append(bytes, length);
-    increase(queued_path_ticks, checked.path_ticks);
-    queue_end = checked.end;
+    increase(queued.path_ticks, checked.path_ticks);
+    queued.end = checked.end;
 }
 
-bool is_complete() { return queue_end.complete; }
+bool is_complete() { return queued.end.complete; }
 
-uint32_t path_ticks() { return queued_path_ticks; }
+uint32_t path_ticks() { return hal::by_base(queued).path_ticks; }
 
-void begin_segment(uint32_t ticks) { queued_path_ticks -= counted(ticks); }
+void begin_segment(uint32_t ticks) { increase(queued.path_ticks, 0 - counted(ticks)); }
 
 }  // namespace intake
 }  // namespace planarm

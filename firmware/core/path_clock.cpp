@@ -61,23 +61,23 @@ void Slice::follow(const Way& way) {
     s0_ = s1_;
     if (s1_ != way.target) s1_ = stretch_after(s1_, way);
     plain_ = (s0_ | s1_) == ONE;  // neither is less
-    increase(end_ticks_, multiply((s0_ + s1_) >> 1, way.path_ticks).high);
+    increase(end_ticks_, multiply_high((s0_ + s1_) >> 1, way.path_ticks));
     if (s0_ != s1_) reciprocal_ = 0xFFFFFFFF / way.path_ticks;
 }
 
 uint32_t Slice::stretch_at(uint16_t path) const {
     if (s0_ == s1_) return s0_;
-    const uint16_t share = static_cast<uint16_t>(multiply(reciprocal_, path).high);  // of the slice, in 2^-16
-    return multiply(s0_, static_cast<uint16_t>(~share)).high + multiply(s1_, share).high;
+    const uint16_t share = static_cast<uint16_t>(multiply_high(reciprocal_, path));  // of the slice, in 2^-16
+    return multiply_high(s0_, static_cast<uint16_t>(~share)) + multiply_high(s1_, share);
 }
 
 uint32_t Slice::ticks_at(uint16_t path) const {
     if (plain_) return start_ticks_ + path;
-    return start_ticks_ + multiply((s0_ + stretch_at(path)) >> 1, path).high;
+    return start_ticks_ + multiply_high((s0_ + stretch_at(path)) >> 1, path);
 }
 
 uint16_t Slice::stretched(uint16_t ticks, uint16_t path) const {
-    const uint32_t longer = multiply(stretch_at(path), ticks).high;
+    const uint32_t longer = multiply_high(stretch_at(path), ticks);
     return longer < 0xFFFF ? static_cast<uint16_t>(longer) : 0xFFFF;
 }
 

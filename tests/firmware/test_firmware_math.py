@@ -22,6 +22,7 @@ ROUNDS = 60
 CYCLES = {
     "multiply": (51, 51),
     "multiply_low": (59, 59),
+    "multiply_high": (60, 60),
     "multiply_saturated": (61, 64),
     "multiply_q16": (165, 169),
     "multiply_q32": (165, 169),
@@ -96,6 +97,7 @@ def test_a_product_of_48_bits(chip: Chip) -> None:
     ("name", "b_bytes", "expected"),
     [
         ("multiply_low", 2, lambda a, b: a * b % 2**32),
+        ("multiply_high", 2, lambda a, b: a * b >> 16),
         ("multiply_saturated", 2, lambda a, b: min(a * b, 2**32 - 1)),
         ("multiply_q16", 4, lambda a, b: min(a * b >> 16, 2**32 - 1)),
         ("multiply_q32", 4, lambda a, b: a * b >> 32),

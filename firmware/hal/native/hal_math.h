@@ -13,10 +13,11 @@ inline Fixed48 multiply(uint32_t a, uint16_t b) {
     return {static_cast<uint32_t>(product >> 16), static_cast<uint16_t>(product)};
 }
 
-// a b modulo 2^32.
+// a b modulo 2^32, and a b / 2^16, rounded down.
 inline uint32_t multiply_low(uint32_t a, uint16_t b) {
     return static_cast<uint32_t>(static_cast<uint64_t>(a) * b);
 }
+inline uint32_t multiply_high(uint32_t a, uint16_t b) { return multiply(a, b).high; }
 
 // a b; a b / 2^16 and a b / 2^32, rounded down: 2^32 - 1 when it does not fit.
 inline uint32_t saturated(uint64_t value) {

@@ -11,8 +11,9 @@ namespace hal {
 // a b, in 48 bits; 51 cycles.
 Fixed48 multiply(uint32_t a, uint16_t b);
 
-// a b modulo 2^32; 59 cycles.
+// a b modulo 2^32, and a b / 2^16, rounded down; 59 and 60 cycles.
 uint32_t multiply_low(uint32_t a, uint16_t b);
+uint32_t multiply_high(uint32_t a, uint16_t b);
 
 // a b; a b / 2^16 and a b / 2^32, rounded down: 2^32 - 1 when it does not fit. 61 to 64 cycles, and 165
 // to 169.

@@ -97,6 +97,16 @@ __attribute__((naked, noinline)) uint32_t multiply_low(uint32_t, uint16_t) {
         )" ::[multiply] "i"(multiply));
 }
 
+__attribute__((naked, noinline)) uint32_t multiply_high(uint32_t, uint16_t) {
+    __asm__ __volatile__(
+        R"(
+        call %x[multiply]
+        movw r22, r18
+        movw r24, r20
+        ret
+        )" ::[multiply] "i"(multiply));
+}
+
 __attribute__((naked, noinline)) uint32_t multiply_saturated(uint32_t, uint16_t) {
     __asm__ __volatile__(
         R"(
