@@ -102,7 +102,7 @@ def test_a_motion_with_other_first_steps_is_refused(plan):
         with_first_steps(train, [0, 3], turned)
 
 
-@pytest.mark.parametrize("ready_s", [0.05, 0.2, 0.4, 0.6])
+@pytest.mark.parametrize("ready_s", [0.05, 0.3, 0.7, 1.1])
 def test_a_border_leaves_the_device_enough_until_the_other_motion_is_there(plan, ready_s):
     """The firmware's own rule, slice by slice: no slice that it prepares by then is starving, with 15 ms to spare."""
     border = first_border(plan, 0, ready_s)

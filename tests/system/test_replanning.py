@@ -46,8 +46,8 @@ def test_an_obstacle_on_the_way_ahead_is_gone_around(plan):
 
 def test_an_obstacle_in_the_arm_is_unavoidable_and_told(plan):
     at_s = 0.5 * plan.trajectory.duration_s
-    x, y = tip_at(plan, 0.56)
-    done = Outcome([Arrival(at_s, circle(x, y, 16.0))])  # so wide that the arm rests in it
+    x, y = tip_at(plan, 0.52)
+    done = Outcome([Arrival(at_s, circle(x, y, 5.0))])
     assert [one.verdict for one in done.result.encounters] == ["unavoidable"]
     assert not done.result.reached
     assert "unavoidable" in done.result.reason

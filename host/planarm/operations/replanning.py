@@ -42,7 +42,7 @@ from planarm.operations.splicing import Border, borders_from, first_border, plan
 from planarm.operations.verdicts import Verdict, contact_time_s, judge_contact, whereabouts_s
 from planarm.pipeline import plan_scene
 from planarm.plan import Plan
-from planarm.roadmap.planning import RoadmapTask, shorter_way, way_from
+from planarm.roadmap.planning import RoadmapTask, way_from
 from planarm.routes.route import route_through
 from planarm.scene import Obstacle, Scene
 from planarm.streaming.plan_stream import options_for
@@ -338,16 +338,18 @@ def _legs(run: _Run, notice: Notice) -> tuple[Floats, str]:
 
 
 def first_plan(scene: Scene, notice: Notice) -> tuple[RoadmapTask, Plan]:
-    """Return a scene's roadmap, ready for obstacles, and the first plan on it; errors as `plan_scene`."""
+    """Return a scene's roadmap, ready for obstacles, and the first plan on it; errors as `plan_scene`.
+
+    Its way is left as it was found: one without detours is driven so fast that it can seldom be left at speed.
+    """
     margin_cm = planning_margin_cm(scene)
     task = RoadmapTask.of(scene, margin_cm)
     task.roadmap.prepare()
     answer = task.planner.solve()
     if not len(answer.nodes):
         raise task.no_way(scene)
-    way = task.roadmap.poses_rad[answer.nodes]
-    poses, cost = shorter_way(task.roadmap, joint_world(scene, margin_cm), way, answer.cost)
-    return task, plan_scene(scene, notice, route_through(scene, margin_cm, poses, cost))
+    poses = task.roadmap.poses_rad[answer.nodes]
+    return task, plan_scene(scene, notice, route_through(scene, margin_cm, poses, answer.cost))
 
 
 def plan_from(scene: Scene, task: RoadmapTask, rest_rad: Floats, notice: Notice) -> Plan:
@@ -357,11 +359,10 @@ def plan_from(scene: Scene, task: RoadmapTask, rest_rad: Floats, notice: Notice)
         NoPathError: the arm rests too near to an obstacle, or nothing joins it with the goal any more.
     """
     margin_cm = planning_margin_cm(scene)
-    world = joint_world(scene, margin_cm)
-    found = way_from(task, world, rest_rad)
+    found = way_from(task, joint_world(scene, margin_cm), rest_rad)
     if found is None:
         raise NoPathError(f"{scene.source}: no way leads on from {_pose_words(scene, rest_rad)} to the goal")
-    poses, cost = shorter_way(task.roadmap, world, *found)
+    poses, cost = found
     x, y = forward(Arm.from_spec(scene.arm), rest_rad)[-1]
     start = replace(scene.task, start_cm=(float(x), float(y)), start_rad=tuple(map(float, rest_rad)))
     from_here = replace(scene, task=start)

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from math import ceil
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from planarm.model.arm import Arm
-from planarm.roadmap.planning import RoadmapTask, cost_of, shorter_way, ways_on
+from planarm.roadmap.planning import RoadmapTask, ways_on
 from planarm.scene import Scene
 from planarm.smoothing.joint_blend import blend_poses
 from planarm.smoothing.joint_spline import JointSpline, part_of, run_on, scaled
@@ -21,10 +22,10 @@ Floats = NDArray[np.float64]
 
 MOST_CORNERS = 6
 """Corners of the old way up to which it may be left."""
+BETWEEN_RAD = 0.15
+"""Between corners it may be left about so often."""
 PLACES_RAD = (0.15, 0.3, 0.45, 0.65, 0.9, 1.2, 1.6, 2.1, 2.8)
-"""So far along the path it may be left, too: each place costs a question to the search."""
-NEAR_RAD = 0.08
-"""Not so near to a corner."""
+"""So far along it a curve may be left, too: each place costs a question to the search."""
 ROUNDING_RAD = 1e-9
 REACHES_RAD = (0.2, 0.45, 0.8)
 """How far a path's tangent is followed."""
@@ -79,10 +80,9 @@ def tails_at_corners(
     """Yield ways that leave a rounded polyline at one of its next corners or between them, the cheapest first."""
     ahead = _ahead(path, poses_rad, at_s, world)
     ways = ways_on(task, world, np.array(ahead.poses_rad)) if ahead.poses_rad else []
-    for whole, k, found in ways:
+    for cost, k, way in ways:
         straight_s = _straight_from(path, max(at_s, ahead.leg_s[k]))
         if straight_s < ahead.s[k]:
-            way, cost = _shorter(task, world, found, whole)
             turned = _turned(path.evaluate(np.array([straight_s])).q_rad[0], way, scene, world)
             rest = turned if straight_s == at_s else run_on([part_of(path, at_s, straight_s), turned])
             yield Tail(rest, np.concatenate([poses_rad[: ahead.corner[k]], way]), cost)
@@ -103,18 +103,10 @@ def tails_along_tangents(
             there = pose + reach_rad / rate * state.dq_rad[0]
             if prove_joint_line(world, pose, there)[0] != PROVED:
                 break
-            for whole, _, found in ways_on(task, world, there[None]):
-                way, cost = _shorter(task, world, found, whole)
+            for cost, _, way in ways_on(task, world, there[None]):
                 turned = scaled(_turned(pose, way, scene, world), rate)
                 rest = turned if left_s == at_s else run_on([part_of(path, at_s, left_s), turned])
                 yield Tail(rest, np.concatenate([path.evaluate(old).q_rad, pose[None], way]), cost)
-
-
-def _shorter(task: RoadmapTask, world: JointWorld, way: Floats, cost: float) -> tuple[Floats, float]:
-    """Return a way made shorter, and what the whole costs then; in one round, since the arm moves meanwhile."""
-    own = cost_of(task.roadmap, way)
-    poses, less = shorter_way(task.roadmap, world, way, own, rounds=1)
-    return poses, cost - own + less
 
 
 def _places(path: JointSpline, at_s: float, end_s: float) -> list[float]:
@@ -145,23 +137,25 @@ class _Ahead(NamedTuple):
 def _ahead(path: JointSpline, poses: Floats, at_s: float, world: JointWorld) -> _Ahead:
     """Return where an old way may be left, as far as its legs are still free."""
     corners_s = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(poses, axis=0), axis=1))])
-    start, end_s = path.evaluate(np.array([at_s])).q_rad[0], float(corners_s[-1])
-    corners = corners_s[(corners_s > at_s) & (corners_s < end_s)][:MOST_CORNERS]
-    between = at_s + np.array(
-        [away for away in PLACES_RAD if np.abs(at_s + away - corners).min(initial=1.0) > NEAR_RAD]
-    )
-    found, since = _Ahead([], [], [], []), start
-    for s in np.sort(np.concatenate([corners, between[between < end_s]])):
-        k = int(np.searchsorted(corners_s, s - ROUNDING_RAD))
-        leg = corners_s[k] - corners_s[k - 1]
-        pose = poses[k - 1] + (s - corners_s[k - 1]) / leg * (poses[k] - poses[k - 1])
-        if prove_joint_line(world, since, pose)[0] != PROVED:
-            return found
-        since = pose
-        found.poses_rad.append(pose)
-        found.s.append(float(s))
-        found.leg_s.append(float(corners_s[k - 1]))
-        found.corner.append(k)
+    first = int(np.searchsorted(corners_s, at_s))
+    start = path.evaluate(np.array([at_s])).q_rad[0]
+    found = _Ahead([], [], [], [])
+    for k in range(first, min(first + MOST_CORNERS, len(poses))):
+        leg = poses[k] - poses[k - 1]
+        parts = max(1, ceil(float(np.linalg.norm(leg)) / BETWEEN_RAD))
+        since = start if k == first else poses[k - 1]
+        for part in range(1, parts + 1):
+            pose = poses[k] if part == parts else poses[k - 1] + part / parts * leg
+            s = float(corners_s[k - 1] + part / parts * (corners_s[k] - corners_s[k - 1]))
+            if s <= at_s:
+                continue
+            if (k == len(poses) - 1 and part == parts) or prove_joint_line(world, since, pose)[0] != PROVED:
+                return found
+            since = pose
+            found.poses_rad.append(pose)
+            found.s.append(s)
+            found.leg_s.append(float(corners_s[k - 1]))
+            found.corner.append(k)
     return found
 
 
