@@ -6,6 +6,10 @@ the neighbours say it is; nodes where they differ wait in a heap by (min(g, rhs)
 never removed: one whose key is not its node's present key is passed over. Lengths are integers, so that nodes on one
 shortest path have equal keys: with rounding errors a blocked node of the path can seem to lie beyond the start, and the
 repair would end too soon.
+
+`search.lifelong` does the same on a graph with its moves written out, real costs and a heap whose entries can be moved.
+Here moves are looked up in a bit map of each sample. One core for both would have to be handed these as functions,
+which kernels are not (`planarm_wire.kernel_cache`), or the grid be written out as a graph for each sample.
 """
 
 import heapq
