@@ -39,6 +39,7 @@ from planarm.run_folder.folder import begin_run_folder, finish_run_folder
 from planarm.run_folder.summary import planned_figures, seen_figures, summarise
 from planarm.scene import Scene
 from planarm.search.path import Path as TipPath
+from planarm.stepping.calmer import with_advice
 from planarm.stepping.certify import certify
 from planarm.stepping.schedule import encode, schedule
 from planarm.streaming.carry_out import carry_out
@@ -79,6 +80,9 @@ def plan_scene(scene: Scene, notice: Notice, route: Route | None = None) -> Plan
     trajectory, train, segments = schedule(scene, motion.under, lambda share: notice("plan", 0.6 + 0.2 * share))
     notice("plan", 0.8)
     certificate = certify(scene, trajectory, train, segments)
+    if scene.planner.objective != "time":  # whose path would be another
+        calmer = partial(motion_along, route=route, margin_cm=margin_cm, notice=notice)
+        certificate = with_advice(scene, certificate, lambda changed: calmer(changed).trajectory)
     notice("plan", 1.0)
     return Plan(
         scene,

@@ -12,6 +12,7 @@ from planarm.stepping.check_motion import Planned, check_deviation, check_limits
 from planarm.stepping.check_space import check_space
 from planarm.stepping.check_steps import check_counts, check_gaps
 from planarm.stepping.check_stop import check_stop
+from planarm.stepping.check_swing import check_swing
 from planarm.stepping.check_torque import check_torque
 from planarm.stepping.check_wire import check_pulses, check_wire
 from planarm.stepping.expand import expand
@@ -20,6 +21,7 @@ from planarm.stepping.poses import motor_positions
 from planarm.stepping.table import table_of
 from planarm.stepping.train import StepTrain
 from planarm.trajectory.motion import Trajectory
+from planarm_wire.messages import TICKS_HZ
 
 __all__ = ["Certificate", "Check", "certify"]
 
@@ -49,6 +51,7 @@ def certify(
         planned = Planned.of(trajectory)
         checks += check_limits(planned, scene.joints)
         checks += check_torque(planned, scene)
+        checks += check_swing(planned, plan, made, scene, from_ticks / TICKS_HZ)
         checks += check_stop(plan, table, planned, scene)
     checks += check_deviation(trajectory, scene, made, at)
     checks += check_space(scene, made, at, from_ticks)
