@@ -7,7 +7,7 @@ import numpy as np
 
 from board_scenes import scene_of
 from planarm.model.arm import Arm
-from planarm.pipeline import timed
+from planarm.motions.motion import timed
 from planarm.routes.gentle import gentle_motion, jerk_limits
 from planarm.smoothing.joint_blend import blend_poses
 from planarm.stepping.schedule import schedule
