@@ -60,8 +60,10 @@ SETTLE_AFTER_FAILURE_S = 1.0
 """Emulated time after a stream that failed: what the board has queued is executed, and the arm comes to rest."""
 
 
-def plan_scene(scene: Scene, notice: Notice, route: Route | None = None) -> Plan:
+def plan_scene(scene: Scene, notice: Notice, route: Route | None = None, *, advise: bool = False) -> Plan:
     """Plan, time, quantise, compress and certify; a route that is known is not searched.
+
+    With `advise` a certificate that is red for swings names accelerations that pass: motions are timed to find them.
 
     Raises:
         SceneError: Start or goal cannot be taken.
@@ -80,7 +82,7 @@ def plan_scene(scene: Scene, notice: Notice, route: Route | None = None) -> Plan
     trajectory, train, segments = schedule(scene, motion.under, lambda share: notice("plan", 0.6 + 0.2 * share))
     notice("plan", 0.8)
     certificate = certify(scene, trajectory, train, segments)
-    if scene.planner.objective != "time":  # whose path would be another
+    if advise and scene.planner.objective != "time":  # whose path would be another
         calmer = partial(motion_along, route=route, margin_cm=margin_cm, notice=notice)
         certificate = with_advice(scene, certificate, lambda changed: calmer(changed).trajectory)
     notice("plan", 1.0)
@@ -176,7 +178,7 @@ def run_scene(
             When the stream failed, its notes tell what the emulated arm did, and the folder is complete all the same.
     """
     require_port(port, scene.board)
-    plan = plan_scene(scene, notice)
+    plan = plan_scene(scene, notice, advise=True)
     begin_run_folder(out, stored(plan))
     setup = ArmSetup(scene, plan.segments.start_usteps, faults, fault_seed)
     with closing(open_transport(port, scene.link.baud, setup)) as transport:

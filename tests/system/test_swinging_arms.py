@@ -12,6 +12,7 @@ import numpy as np
 from joint_motions import laden, through
 from planarm.errors import TimingError
 from planarm.link.sim_bench import rig_of
+from planarm.scene.motor import MotorSpec
 from planarm.stepping.check_motion import Planned
 from planarm.stepping.check_swing import NAME, NAME_HELD, check_swing
 from planarm.stepping.expand import expand
@@ -24,6 +25,13 @@ LEAD_TICKS = 160_000
 SETTLE_S = 0.3
 PHASES_PER_STEP = 256
 CLOCK_STEP_S = 1e-4
+
+MOTORS = (
+    MotorSpec(current_a=1.7),
+    MotorSpec(0.8, 2.0, 2.0, 1.4, 3e-3, 24.0, 1.2e-5, 0.03),  # a long NEMA 17
+    MotorSpec(1.9, 2.8, 2.8, 1.13, 3.6e-3, 36.0, 4.8e-5, 0.07),  # NEMA 23
+    MotorSpec(0.16, 0.6, 0.6, 10.0, 9e-3, 24.0, 2.0e-6, 0.008, damping_nm_s=1e-4),  # a small one, damped otherwise
+)
 
 
 def emulated(scene, train):
@@ -81,7 +89,9 @@ def held(scene, trajectory, segments, train, begin_s, pause_s):
 def random_motion(rng):
     """An arm with one to four links and loads, and a motion: through random poses, or to and fro in short moves."""
     joints = int(rng.integers(1, 5))
-    scene = laden(joints, tuple(rng.uniform(0.0, 0.3, joints)), microsteps=int(rng.choice([2, 4, 8, 16])))
+    scene = laden(joints, tuple(rng.uniform(0.0, 0.3, joints)), microsteps=int(rng.choice([1, 2, 4, 8, 16])))
+    motor = MOTORS[int(rng.integers(len(MOTORS)))]
+    scene = replace(scene, joints=tuple(replace(one, motor=motor) for one in scene.joints))
     scene = replace(scene, motion=replace(scene.motion, acceleration_share=float(rng.choice([0.4, 0.8]))))
     if rng.random() < 0.6:
         way, amount = rng.uniform(-0.3, 0.3, joints), np.radians(rng.uniform(1.0, 16.0))

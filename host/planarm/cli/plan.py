@@ -46,7 +46,7 @@ def execute(options: argparse.Namespace) -> int:
         notice("kernels", 0.0)
         warm_up(on_roadmap=scene.planner.on_roadmap, moving=scene.moving is not None)
         notice("kernels", 1.0)
-        plan = plan_scene(scene, notice)
+        plan = plan_scene(scene, notice, advise=True)
         if plan.note:
             notice.warn(plan.note)
     save_plan(stored(plan), target)

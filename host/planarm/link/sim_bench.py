@@ -183,6 +183,7 @@ def _motor(scene: Scene, number: int, joint: JointSpec) -> Motor:
         supply_v=spec.supply_v,
         rotor_inertia_kg_m2=spec.rotor_inertia_kg_m2,
         detent_torque_nm=spec.detent_torque_nm,
+        damping_nm_s=spec.rotor_damping_nm_s,
         gear_ratio=joint.gear_ratio,
         reversed=joint.reversed,
         backlash_rad=mechanics.backlash_rad[number],

@@ -8,7 +8,7 @@ from planarm.errors import TimingError
 from planarm.scene import Scene
 from planarm.stepping.certificate import Certificate
 from planarm.stepping.check_motion import Planned
-from planarm.stepping.check_swing import NAME, NAME_HELD, check_swing
+from planarm.stepping.check_swing import NAME, NAME_HELD, NAME_STOPPED, check_swing
 from planarm.stepping.expand import expand
 from planarm.stepping.schedule import encode
 from planarm.trajectory.motion import Trajectory
@@ -27,7 +27,7 @@ def with_advice(scene: Scene, certificate: Certificate, timing: Callable[[Scene]
         timing: times the plan's path for a scene with other joints; it may raise TimingError.
     """
     red = [check for check in certificate.checks if check.verdict == "red"]
-    if not red or not all(check.name.endswith((NAME, NAME_HELD)) for check in red):
+    if not red or not all(check.name.endswith((NAME, NAME_HELD, NAME_STOPPED)) for check in red):
         return certificate
     share = _passing_share(scene, timing)
     if share is None:

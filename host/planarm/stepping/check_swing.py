@@ -3,10 +3,9 @@
 The torque check is quasi-static; this one lets the rotors swing (`planarm.stepping.swing`), along the expanded segments
 and, with the changes of the path clock that the allowances permit, through one hold at any moment. Moments are tried
 one after another: a dense sample, not a proof; a second hold while the first one still swings is not in it. Quick stops
-and those of a starving queue use all of the allowed slowing; a lag beyond the limit there is amber.
+and those of a starving queue use all of the allowed slowing. An override is not in it: it changes the clock as a hold
+does, but then the motion runs at another rate.
 """
-
-from dataclasses import replace
 
 import numpy as np
 
@@ -30,7 +29,8 @@ MOST_FULL_STEPS = 1.0
 on it is lost. Half a micro-step comes on top: so much of the lag is the field's own jump."""
 AMBER_BELOW = 0.2
 MOST_HELD_FULL_STEPS = 1.5
-"""With a hold on the way, which most motions never see, half a step is left to where a rotor is lost."""
+"""With a hold on the way, which most motions never see, half a step is left to where a rotor is lost, however coarse
+the micro-steps are."""
 QUIET_BELOW = 0.75
 """Where no rotor comes nearer than this to the limit, running and in a first pattern of holds, one pattern is all."""
 
@@ -65,7 +65,10 @@ def check_swing(planned: Planned, plan: SegmentPlan, made: StepTrain, scene: Sce
     """
     swinging = Swinging.of(planned, made, scene)
     half_usteps = 0.5 / np.array([joint.microsteps for joint in scene.joints])
-    most, most_held = MOST_FULL_STEPS + half_usteps, MOST_HELD_FULL_STEPS + half_usteps
+    most, most_held = (
+        np.minimum(MOST_FULL_STEPS + half_usteps, MOST_HELD_FULL_STEPS),
+        np.full(len(scene.joints), MOST_HELD_FULL_STEPS),
+    )
     running = swinging.follow(swinging.start, swinging.path_s, after_s=AFTER_S)
     found = [(NAME, SETTING, running, most, most - AMBER_BELOW)]
     if plan.allowances:
@@ -78,8 +81,6 @@ def check_swing(planned: Planned, plan: SegmentPlan, made: StepTrain, scene: Sce
         for j, (limit, amber) in enumerate(zip(limits, ambers, strict=True)):
             value, where = run.lags_rad[j] / FULL_STEP_RAD, _place(planned, scene, float(run.at_s[j]))
             check = at_most(f"joint {j + 1} {name}", value, limit, "full steps", where, setting, amber=amber)
-            if name == NAME_STOPPED and check.verdict == "red":
-                check = replace(check, verdict="amber")
             checks.append(check)
     return checks
 
@@ -98,9 +99,9 @@ def held_runs(swinging: Swinging, holds: Holds, running: Run, most_rad: Floats, 
     every_s = max(HOLD_EVERY_S, end_s / MOST_MOMENTS) if from_s == 0.0 else HOLD_EVERY_HURRIED_S
     for number, at_s in enumerate(np.arange(from_s + every_s, end_s, every_s)):
         here = swinging.follow(here, float(at_s))
+        held, stopped = held.worse(here), stopped.worse(here)
         if (here.lags_rad > LOST_RAD).any():
             break  # the running motion itself is red
-        held, stopped = held.worse(here), stopped.worse(here)
         pause_s = np.array([LONGEST_PAUSE_S * (number * GOLDEN % 1.0)])
         one = holds._replace(begin_s=np.array([here.path_s]), pause_s=pause_s, share=np.array([GENTLE]))
         if (held.lags_rad <= most_rad).all():

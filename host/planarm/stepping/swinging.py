@@ -42,10 +42,8 @@ STEPS_PER_TURN = 24.0
 STIFFEST = 20.0
 """A gear counts as no stiffer than so many fields, so that steps need not be shorter: it takes a twentieth of a lag."""
 
-ROTOR_DAMPING = 0.015
 GEAR_DAMPING = 0.05
-"""Of critical, for the rotor in its field and on its gear: data sheets give neither. A rotor alone rings for some ten
-periods after a step, which is 1 to 3 %."""
+"""Of critical, for the rotor on its gear."""
 
 MOST_STRETCH = 5.0
 """Holds may make the motion so many times as long; beyond, the clock hardly changes, and nothing swings."""
@@ -166,7 +164,7 @@ def _rotors(scene: Scene) -> Rotors:
         gear_damping_nm_s=2.0 * GEAR_DAMPING * np.sqrt(stiffness * inertia * gears**2),
         half_play_rad=0.5 * np.array(scene.mechanics.backlash_rad),
         inertia_kg_m2=inertia,
-        damping_nm_s=2.0 * ROTOR_DAMPING * np.sqrt(teeth * peak * inertia),
+        damping_nm_s=np.array([motor.rotor_damping_nm_s for motor in motors]),
         teeth=teeth,
         constant_nm_a=peak / np.array([motor.current_a for motor in motors]),
         detent_nm=detent,
@@ -189,11 +187,14 @@ def _field_of(made: StepTrain, scene: Scene) -> Field:
 
 
 def _start(links: Links, rotors: Rotors, field: Field) -> Run:
-    """Return the arm at rest with every rotor where its field is."""
+    """Return the arm at rest: every rotor lags behind its field, and every gear is strained, by what holds the arm."""
     state = np.zeros((STATE_ROWS, len(rotors.gear)))
     phase_rad = field.phases[field.first[:-1]] * RAD_PER_PHASE
-    state[ROTOR] = phase_rad / rotors.teeth
-    state[ANGLE] = links.zero_rad + np.linalg.solve(links.coupling, state[ROTOR] / rotors.gear)
+    geared_nm = np.linalg.solve(links.coupling.T, links.held_nm[0])
+    share = geared_nm / rotors.gear / (rotors.constant_nm_a * rotors.current_a)
+    strain = geared_nm / rotors.stiffness_nm_rad + np.sign(geared_nm) * rotors.half_play_rad
+    state[ROTOR] = (phase_rad - np.arcsin(np.clip(share, -1.0, 1.0))) / rotors.teeth
+    state[ANGLE] = links.zero_rad + np.linalg.solve(links.coupling, state[ROTOR] / rotors.gear - strain)
     state[CURRENT_A] = rotors.current_a * np.cos(phase_rad)
     state[CURRENT_B] = rotors.current_a * np.sin(phase_rad)
     state[ENTRY] = field.first[:-1]
