@@ -13,7 +13,7 @@ namespace wire {
 // Both ends must have the same.
 constexpr uint8_t PROTOCOL_VERSION = 2;
 // Of the specification without its wording.
-constexpr uint32_t SPEC_HASH = 0x109D905EUL;
+constexpr uint32_t SPEC_HASH = 0xF20E09A7UL;
 
 // Ends every frame.
 constexpr uint8_t DELIMITER = 0x7E;

@@ -17,7 +17,7 @@ namespace {
 // One run more than can be in use, so that a full ring and an empty one differ. Four joints have two: the
 // bytes of a third are the queue's, and the pace that the certificate asks for is kept
 // (tests/firmware/test_firmware_pace.py).
-constexpr uint8_t RING_RUNS = wire::JOINTS > 2 ? 3 : 4;
+constexpr uint8_t RING_RUNS = 4;
 // How far ahead of its first step a joint is started: the 16-bit timer must still tell early from late.
 constexpr int32_t START_AHEAD_TICKS = 0x7000;
 // A freeze leaves alone a step that is nearer than this.
@@ -77,9 +77,9 @@ void take_back(uint8_t joint) {
 // Places the first edge of an idle joint's next run. False when it is too late for it.
 template <uint8_t JOINT>
 bool start(const Run& run) {
-    const uint16_t margin =
-        static_cast<uint16_t>((hal::dir_is<JOINT>(run.dir_high) ? STEP_MARGIN_TICKS : DIR_MARGIN_TICKS) +
-                              hal::step_early_ticks<JOINT>());
+    const uint16_t margin = static_cast<uint16_t>(
+        (hal::dir_is<JOINT>(run.dir_high) ? hal::START_MARGIN_TICKS : DIR_MARGIN_TICKS) +
+        hal::step_early_ticks<JOINT>());
     hal::dir_write<JOINT>(run.dir_high);
     hal::set_steps_left<JOINT>(run.steps);
     hal::set_step_fraction<JOINT>(run.fraction);
@@ -248,7 +248,7 @@ uint32_t end_steps() {
         finish_pulse<joint.NUMBER>();
         cut_active<joint.NUMBER>(on, 0);
     });
-    return clock::extend(last);
+    return clock::extend(last) - hal::LATE_TICKS;
 }
 
 void drop_runs() {

@@ -81,7 +81,8 @@ bool serve();
 // True from a missed step until its run is dropped.
 inline bool missed() { return step_missed != 0; }
 
-// Stops all joints at once and counts the steps that have risen: those up to the tick that is returned.
+// Stops all joints at once and counts the steps that have risen: all up to the tick that is returned, and
+// none after it where compare outputs make them.
 uint32_t end_steps();
 
 // Drops all runs that are left; all joints must be stopped.

@@ -30,8 +30,8 @@ at 12,800, four at 15,000 (uno_four)."""
 SLICE_JOINT_TICKS: Final = 4_000
 """The same on each joint in each further slice of it."""
 
-PREPARED_SLICES: Final = 4
-"""So many slices are prepared at once, the one that is executed included (firmware/core/motion.cpp)."""
+PREPARED_SLICES: Final = 3
+"""Of so many slices a joint has runs at once, that of the one being executed included (firmware/core/step_engine.cpp)."""
 
 LINE_LOAD: Final = 0.1
 """Share of the processor that the interrupts of a busy line take."""

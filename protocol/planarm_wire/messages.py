@@ -14,7 +14,7 @@ from planarm_wire.layout import EACH_JOINT, END, Field
 
 PROTOCOL_VERSION: Final = 2
 """Both ends must have the same."""
-SPEC_HASH: Final = 0x109D905E
+SPEC_HASH: Final = 0xF20E09A7
 """Hash of the specification without its wording."""
 DELIMITER: Final = 0x7E
 """Ends every frame."""
@@ -122,7 +122,7 @@ BOARDS: Final[dict[str, Board]] = {
         doc="Own wiring, four joints: joints 1 and 2 as with two, joints 3 and 4 stepped by one interrupt",
         pin_map="own",
         joints=4,
-        queue_bytes=632,
+        queue_bytes=552,
         min_interval_ticks=1_000,
         min_step_high_ticks=56,
         min_step_low_ticks=40,
@@ -167,7 +167,7 @@ BOARDS: Final[dict[str, Board]] = {
         doc="The Arduino CNC shield as it is, slots X, Y, Z and A (D12 and D13): every step rises in an interrupt",
         pin_map="cnc_shield",
         joints=4,
-        queue_bytes=632,
+        queue_bytes=552,
         min_interval_ticks=1_280,
         min_step_high_ticks=56,
         min_step_low_ticks=40,

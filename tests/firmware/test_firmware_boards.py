@@ -377,3 +377,89 @@ def test_a_switch_that_closes_in_motion_tells_its_joint(name: str, joint: int) -
     assert status.ledger.position_usteps == tuple(
         board.position_at(number, board.now) for number in range(BOARDS[name].joints)
     )
+
+
+CLI, JUMP_TO_ITSELF, STORE_OCR1AH = b"\xf8\x94", b"\xff\xcf", b"\x89\x00"
+
+
+def place_of_start(flash: bytes) -> int:
+    """Where the main program locks interrupts to start joint 1: the CLI before the first store to OCR1A behind one."""
+    words = [flash[at : at + 2] for at in range(0, len(flash), 2)]
+    (place, *_) = (at for at, word in enumerate(words) if word == CLI and STORE_OCR1AH in words[at : at + 10])
+    return place
+
+
+@pytest.mark.parametrize("name", ["uno", "uno_slow", "uno_four"])
+def test_a_joint_that_is_started_too_late_makes_no_step(name: str) -> None:
+    # The main program is held up right before it starts the joint, until some ticks before its first step, or after.
+    interval, steps = 4000, 10
+    tracer = Tracer(RELEASE / f"{name}.hex", BOARDS[name])
+    board = Board(tracer)
+    tracer.run = super(Tracer, tracer).run  # type: ignore[method-assign]
+    board.get_ready()
+    move = run_of(steps, first=1000, interval=interval, positive=False)
+    board.ask(Segments(0, 0, 0, end_motion([segment_of(steps * interval, move, joints=BOARDS[name].joints)])))
+    board.send(Start(200_000))
+    board.run(150_000)
+    flash, chip = tracer.uno.flash, tracer.chip
+    place, trap = (
+        place_of_start(flash),
+        next(at for at in range(0, 16_000) if flash[2 * at : 2 * at + 2] == JUMP_TO_ITSELF),
+    )
+    tracer.run_until(lambda: chip.pc == place)
+    begun, starting, seq, edges = chip.cycle, tracer.uno.snapshot(), board.seq, tuple(board.edges)
+
+    def play(held_until: int) -> tuple[Status, list[int]]:
+        tracer.uno.restore(starting)
+        board.forget_replies()
+        board.seq, board.edges[:] = seq, edges
+        if held_until > begun:
+            sreg = chip.sreg
+            chip.pc, chip.sreg = trap, sreg & 0x7F
+            chip.run_to(held_until)
+            chip.pc, chip.sreg = place, sreg
+        board.run(steps * interval + 300_000)
+        return board.ask(), board.rises(0)
+
+    _, planned = play(0)
+    assert len(planned) == steps
+    faults = set()
+    for before in range(100, -20, -3):
+        status, made = play(planned[0] - before)
+        faults.add(status.fault)
+        assert made == (planned if status.fault is Fault.NONE else []), f"{before} ticks before its step"
+        assert status.ledger.position_usteps[0] == -len(made)
+    assert faults == {Fault.NONE, Fault.MISSED_DEADLINE}
+
+
+@pytest.mark.parametrize("name", ["uno_four", "cnc_shield", "cnc_shield_four"])
+def test_a_fault_never_tells_more_segments_than_were_made(name: str) -> None:
+    # The last step of a segment is a tick before its end, and rises later than that where an interrupt makes it.
+    wiring = BOARDS[name]
+    interval = 3 * wiring.min_interval_ticks
+    steps = 120_000 // interval
+    move = run_of(steps, first=interval - 1, interval=interval)
+    segment = segment_of(steps * interval, *[move] * wiring.joints, joints=wiring.joints)
+    board = Board(emulated(name))
+    board.get_ready()
+    for _ in range(10):
+        board.ask(Segments(0, 0, 0, (segment,)))
+    uno, seq = board._firmware.uno, board.seq
+    queued, told = uno.snapshot(), set()
+    for later_ticks in range(0, 60_000, 83):
+        uno.restore(queued)
+        board.forget_replies()
+        board.edges.clear()
+        board.seq = seq
+        board.send(Start(LEAD_TICKS + later_ticks))
+        board.run(LEAD_TICKS + 150_000)
+        board.send(Segments(0, 0, 0, (segment_of(0, joints=wiring.joints),)))
+        board.run(20_000)
+        status = board.ask()
+        assert status.fault is Fault.BAD_SEGMENT
+        made = status.ledger.position_usteps
+        assert made == tuple(len(board.rises(joint)) for joint in range(wiring.joints))
+        assert all(status.ledger.executed_segments * steps <= count for count in made), (status.ledger, later_ticks)
+        assert status.ledger.executed_segments >= min(made) // steps - 1
+        told.add(status.ledger.executed_segments)
+    assert len(told) > 1

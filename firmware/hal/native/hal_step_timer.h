@@ -119,6 +119,8 @@ bool step_is_high() {
 
 // As on the Uno, where the interrupt makes the fall.
 constexpr uint16_t STEP_MARGIN_TICKS = planarm::wire::MIN_STEP_LOW_TICKS - 2;
+constexpr uint16_t START_MARGIN_TICKS = STEP_MARGIN_TICKS;
+constexpr uint16_t LATE_TICKS = 0;
 
 template <uint8_t JOINT>
 bool step_is_counted() {

@@ -42,8 +42,11 @@ static_assert(!SECOND_MATCH || (output<0>() == Output::COMPARE && planarm::wire:
 
 // Distance that an edge must still have when the interrupt that places it looks at the timer: the low time,
 // less 2 between the fall and the look. With a second match the low time is what the intervals leave: no more
-// than the way to the compare register, which leads past TCCR1A when a joint is started.
+// than the way to the compare register.
 constexpr uint16_t STEP_MARGIN_TICKS = SECOND_MATCH ? 14 : planarm::wire::MIN_STEP_LOW_TICKS - 2;
+// The same for the main program, which starts a joint: its way to the output's mode and the interrupt is 32.
+constexpr uint16_t START_MARGIN_TICKS = SECOND_MATCH ? 38 : STEP_MARGIN_TICKS;
+static_assert(START_MARGIN_TICKS >= 38, "the way to TCCR1A");
 static_assert(!SECOND_MATCH || planarm::wire::MIN_INTERVAL_TICKS - planarm::wire::MIN_STEP_HIGH_TICKS >=
                                    planarm::wire::MIN_STEP_LOW_TICKS,
               "the low time");
@@ -263,6 +266,9 @@ HAL_INLINE void step_interrupts_off() {
     TIMSK1 = ONLY_LAPS;
     if (planarm::wire::JOINTS > 2) scheduled_on = TIMSK2 = 0;
 }
+
+// A step that is made at all may rise so much later than its tick, where an interrupt makes it.
+constexpr uint16_t LATE_TICKS = output<0>() == Output::COMPARE && planarm::wire::JOINTS == 2 ? 0 : 512;
 
 // From the reading of the timer in end_steps to the last match that its writing of TCCR1A lets act.
 constexpr uint16_t END_TICKS = 4;
