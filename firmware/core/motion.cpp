@@ -166,7 +166,7 @@ bool Motion::is_starving(uint8_t margin) const {
     entry.ends_motion = way.ends_segment && segment_last;
     entry.calm = true;
     for (uint8_t joint = 0; joint < wire::JOINTS; ++joint) {
-        if (!cursors[joint].is_calm(slice, settings::config.start_stop_ticks[joint])) entry.calm = false;
+        entry.calm = entry.calm && cursors[joint].is_calm(slice, settings::config.start_stop_ticks[joint]);
     }
     filling = true;
 }
