@@ -436,7 +436,7 @@ def test_a_joint_that_is_started_too_late_makes_no_step(name: str) -> None:
 def test_a_fault_never_tells_more_segments_than_were_made(name: str) -> None:
     # The last step of a segment is a tick before its end, and rises later than that where an interrupt makes it.
     wiring = BOARDS[name]
-    interval = 2 * wiring.min_interval_ticks
+    interval = 3 * wiring.min_interval_ticks
     steps = 120_000 // interval
     move = run_of(steps, first=interval - 1, interval=interval)
     segment = segment_of(steps * interval, *[move] * wiring.joints, joints=wiring.joints)

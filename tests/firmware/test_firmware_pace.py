@@ -86,3 +86,19 @@ def test_a_row_that_is_too_quick_ends_in_a_fault_and_no_wrong_step() -> None:
     planned = [tick for tick, _ in Schedule.of(motion).steps[0]]
     assert [tick - made[0] for tick in made] == [tick - planned[0] for tick in planned[: len(made)]]
     assert status.ledger.position_usteps == (len(made), 0)
+
+
+@pytest.mark.parametrize("later_ticks", range(0, 2000, 400))
+def test_four_joints_whose_steps_all_fall_on_the_slices_ends(later_ticks: int) -> None:
+    # Every run's last step is a tick before its slice's end, so its room is free as late as can be.
+    steps, interval = 60, 2000
+    segment = segment_of(steps * interval, *[run_of(steps, first=interval - 1, interval=interval)] * 4, joints=4)
+    board = Board(EmulatedFirmware(RELEASE / "uno_four.hex", BOARDS["uno_four"]))
+    board.get_ready()
+    for one in end_motion([segment] * 4):
+        board.ask(Segments(0, 0, 0, (one,)))
+    board.send(Start(LEAD_TICKS + later_ticks))
+    board.run(LEAD_TICKS + 5 * steps * interval)
+    status = board.ask()
+    assert status.fault is Fault.NONE
+    assert status.ledger.position_usteps == (4 * steps,) * 4
