@@ -43,6 +43,7 @@ HOLD_EVERY_S = 0.025
 """One moment after another: a quarter of a period of swings of 10 Hz, where heavy arms swing most."""
 MOST_MOMENTS = 200
 HOLD_EVERY_HURRIED_S = 0.2
+MOST_MOMENTS_HURRIED = 15
 QUICK_STOPS_EVERY = 2
 LONGEST_PAUSE_S = 0.15
 TEST_EVERY_S = 0.3
@@ -96,7 +97,9 @@ def held_runs(swinging: Swinging, holds: Holds, running: Run, most_rad: Floats, 
     if (np.maximum(tested.lags_rad, running.lags_rad) < most_rad - QUIET_BELOW * FULL_STEP_RAD).all():
         return tested, tested
     held, stopped, here = start, start, start
-    every_s = max(HOLD_EVERY_S, end_s / MOST_MOMENTS) if from_s == 0.0 else HOLD_EVERY_HURRIED_S
+    every_s = max(HOLD_EVERY_S, end_s / MOST_MOMENTS)
+    if from_s > 0.0:
+        every_s = max(HOLD_EVERY_HURRIED_S, (end_s - from_s) / MOST_MOMENTS_HURRIED)
     for number, at_s in enumerate(np.arange(from_s + every_s, end_s, every_s)):
         here = swinging.follow(here, float(at_s))
         held, stopped = held.worse(here), stopped.worse(here)
