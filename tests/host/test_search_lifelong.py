@@ -325,6 +325,61 @@ def test_a_flood_tells_whether_there_is_a_way_and_a_search_after_it_which(sized)
     assert lost > sized(10, 100)  # told by the flood
 
 
+class Doors:
+    """A grid of some hundred nodes; whole columns are closed and opened, so that the way is lost and found again."""
+
+    def __init__(self, seed):
+        self.rng, self.size = random.Random(seed), random.Random(seed).randrange(14, 22)
+        walk = Walk(seed, self.size, share=0.0)
+        self.tail, self.head, self.floor = walk.tail, walk.head, walk.graph.cost.copy()
+        self.graph = walk.graph
+        self.start = self.rng.randrange(self.size) * self.size + self.rng.randrange(4)
+        self.goal = self.rng.randrange(self.size) * self.size + self.rng.randrange(self.size - 4, self.size)
+
+    def edges_at(self, nodes):
+        return np.flatnonzero(np.isin(self.tail, nodes) | np.isin(self.head, nodes))
+
+    def column(self, gaps):
+        """Edges at a column but for some of its nodes."""
+        column = self.rng.randrange(5, self.size - 5)
+        rows = [row for row in range(self.size) if row not in gaps]
+        return self.edges_at(np.array(rows) * self.size + column)
+
+    def change(self):
+        """A wall appears, with a gap or without; part of what is closed opens; or most ways are cut near the goal."""
+        rng, cost = self.rng, self.graph.cost
+        closed, kind = np.flatnonzero(cost == np.inf), rng.random()
+        if len(closed) and kind < 0.45:
+            part = closed if rng.random() < 0.5 else np.array(rng.sample(closed.tolist(), 1 + len(closed) // 2))
+            return Changes(part, self.floor[part])
+        if kind < 0.75:
+            edges = self.column(set(rng.sample(range(self.size), rng.randrange(3))))
+            return Changes(edges, np.full(len(edges), np.inf))
+        edges = self.edges_at(np.array([self.goal]))
+        return Changes(edges, self.floor[edges] * rng.choice([1.0, 1.5, 3.0]))
+
+
+def test_what_is_closed_and_opened_between_answers_is_no_lost_way(sized):
+    """Several changes between two answers, also while the planner is to begin anew: the flood must know all of them."""
+    fresh = lost = 0
+    for seed in range(sized(60, 1000)):
+        doors, rng = Doors(seed), random.Random(seed)
+        bounds = Bounds.none(doors.graph.nodes)
+        planner = GraphPlanner(doors.graph, bounds, (doors.start, doors.goal), "mpd_star_lite")
+        planner.solve()
+        for _ in range(10):
+            for _ in range(rng.randrange(4)):
+                planner.change(doors.change())
+                fresh += planner._fresh
+            answer = planner.replan(doors.change())
+            wanted = dijkstra(doors.graph, doors.goal).get(doors.start, math.inf)
+            assert answer.cost == pytest.approx(wanted, rel=1e-9), seed
+            assert (answer.status is SearchStatus.NO_PATH) == (wanted == math.inf), seed
+            lost += wanted == math.inf and answer.work.expanded == SOON
+    assert fresh > sized(60, 1000)
+    assert lost > sized(10, 200)  # told by the flood
+
+
 def test_a_flood_comes_to_a_whole_way_or_to_all_that_can_be_reached():
     for seed in range(200):
         rng = random.Random(seed)

@@ -155,8 +155,10 @@ class GraphPlanner:
         edges, costs = changes
         if not self._state.stores:
             change(self._graph, self._bounds, self._state, edges, costs)
-        elif self._fresh or self._algorithm == "roadmap_a_star":
+        elif self._algorithm == "roadmap_a_star":
             self._graph.cost[edges] = costs
+        elif self._fresh:  # no way is stored that could be cut; which edges are closed is kept for the flood
+            change_costs(self._graph, self._state, edges, costs, self._branch, 0)
         else:
             self._roots, falls = change_costs(self._graph, self._state, edges, costs, self._branch, self._roots)
             self._answered = False
