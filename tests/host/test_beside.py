@@ -2,15 +2,11 @@
 
 import gc
 import threading
-from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 
 from planarm.errors import NoPathError
-from planarm.experiments.scenes import example_file
 from planarm.operations.beside import ALLOWED, AsLong, InThread
-from planarm.pipeline import plan_scene
-from planarm.scene import load_scene
 
 
 def test_a_thread_works_while_its_owner_goes_on():
@@ -83,17 +79,3 @@ def test_what_was_alive_before_is_not_searched_for_garbage_meanwhile():
     assert not is_searched()
     beside.close()
     assert is_searched()
-
-
-def test_threads_that_plan_at_once_plan_as_each_would_alone():
-    """Kernels let go of the interpreter: what they write to must be their thread's own."""
-    scenes = [load_scene(example_file(f"{name}.toml")) for name in ("table1_case1", "elbow_change", "table1_case2")]
-
-    def planned(scene):
-        plan = plan_scene(scene, lambda _stage, _share: None)
-        return plan.segments.segments, plan.segments.allowances, plan.certificate.ok
-
-    alone = [planned(scene) for scene in scenes]
-    with ThreadPoolExecutor(3) as threads:
-        together = list(threads.map(planned, scenes * 4))
-    assert together == alone * 4

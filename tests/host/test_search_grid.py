@@ -1,6 +1,8 @@
 """The search on grids of free and blocked nodes, only nodes checked: Dijkstra on the same explicit graph as oracle."""
 
-from itertools import pairwise
+import threading
+from concurrent.futures import ThreadPoolExecutor
+from itertools import combinations, pairwise
 from math import hypot, inf, sqrt
 
 import numpy as np
@@ -10,6 +12,7 @@ from hypothesis import strategies as st
 from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import dijkstra
 
+from planarm.search import best_first
 from planarm.search.draw import draw_subset
 from planarm.search.grid_search import find_path
 from planarm.search.lattice import make_lattice, node_at
@@ -210,6 +213,24 @@ def test_a_search_that_outgrows_its_first_open_list_is_still_exact():
     assert_same_length(result, dijkstra_cm(free, lambda ix, iy: offsets))
 
 
+@pytest.mark.parametrize(
+    ("seed", "shape", "share", "neighbours"), [(12, (150, 160), 0.8, 80), (106, (127, 197), 0.8, 48)]
+)
+def test_an_open_list_that_fills_up_beside_the_goal_changes_nothing(seed, shape, share, neighbours):
+    """The goal is reached, but its bucket is not done with, when the first open list is full."""
+    free = random_free(seed, shape, share)
+    found = []
+    for entries in (FIRST_ENTRIES, 1 << 20):
+        kept = borrow(free.size)
+        give_back(kept._replace(entry_node=np.empty(entries, np.int32), entry_below=np.empty(entries, np.int32)))
+        found.append(search(free, "chs" if neighbours == 80 else "modified_a_star", neighbours))
+    little, ample = found
+    assert ample.generated > FIRST_ENTRIES - neighbours
+    assert little.status is SearchStatus.FOUND
+    assert np.array_equal(little.path.points_cm, ample.path.points_cm)
+    assert (little.expanded, little.generated) == (ample.expanded, ample.generated)
+
+
 @pytest.mark.parametrize(("algorithm", "neighbours"), EXACT)
 def test_few_nodes_are_expanded_again(algorithm, neighbours):
     """Only those that a better way turns up for within a bucket."""
@@ -238,6 +259,37 @@ def test_what_an_earlier_search_left_in_memory_does_not_matter():
     give_back(kept)
     after = search(free, "chs", 56)
     assert np.array_equal(before.path.points_cm, after.path.points_cm) and before.expanded == after.expanded
+
+
+def test_threads_that_search_at_once_search_as_each_would_alone(monkeypatch):
+    """Kernels let go of the interpreter, so what they write to must be their thread's own while it searches.
+
+    The searches meet: each has its memory before any begins, and none gives it back before all have ended.
+    """
+    maps = [random_free(seed, (150, 160), 0.8) for seed in (11, 12, 13)]
+    alone = [search(free, "chs", 80) for free in maps]
+    all_there, kernel, lent = threading.Barrier(len(maps)), best_first._search, []
+
+    def meet(*arguments):
+        if arguments[0].room.size < maps[0].size:  # the small one that loads the kernels
+            return kernel(*arguments)
+        lent.append(arguments[-1])
+        all_there.wait(30.0)
+        found = kernel(*arguments)
+        all_there.wait(30.0)
+        return found
+
+    kept = borrow(maps[0].size)
+    give_back(kept)  # this thread's, who searched alone
+    monkeypatch.setattr(best_first, "_search", meet)
+    with ThreadPoolExecutor(len(maps)) as threads:
+        together = list(threads.map(lambda free: search(free, "chs", 80), maps))
+    assert len(lent) == len(maps)
+    for one, other in combinations([kept, *lent], 2):
+        assert not any(np.shares_memory(mine, yours) for mine in one for yours in other)
+    for one, other in zip(alone, together, strict=True):
+        assert np.array_equal(one.path.points_cm, other.path.points_cm)
+        assert (one.expanded, one.generated) == (other.expanded, other.generated)
 
 
 def test_an_unknown_neighbourhood_is_refused():

@@ -40,6 +40,7 @@ from planarm.search.legal import (
     move_is_legal,
 )
 from planarm.search.open_list import (
+    BEST,
     BUCKET,
     EXPANDED,
     MADE,
@@ -143,7 +144,7 @@ def _search(
         state[i] = room[i]
     node, below = memory.entry_node, memory.entry_below
     ring = np.full(buckets_for((2 * moves.longest >> BUCKET_BITS) + 2), NONE, np.int32)
-    counts = np.zeros(4, np.int64)
+    counts = np.zeros(5, np.int64)
     lowest_f = norm(moves.planes, start % width - goal % width, start // width - goal // width)
     state[start], g[start] = START, 1
     node[0], below[0], ring[0] = start, NONE, 0
@@ -192,6 +193,7 @@ def expand(  # noqa: C901, PLR0912, PLR0915 - one flat loop: a call that hands o
 ) -> int:
     """Expand nodes until the goal's bucket is done with; return the goal, NONE if it cannot be reached, or FULL.
 
+    After FULL it goes on where it was, the goal being reached or not, once the open list has more room.
     `g` is the cost of the best known way to a node, plus 1 as long as the node waits to be expanded.
     """
     room, width = lattice.room, lattice.width
@@ -203,7 +205,7 @@ def expand(  # noqa: C901, PLR0912, PLR0915 - one flat loop: a call that hands o
     legal = rules.legal
     goal_x, goal_y, rows_per_node = goal % width, goal // width, 1.0 / width
     order = after[0].copy()
-    best = UNREACHED
+    best = counts[BEST] - 1 if counts[BEST] > 0 else UNREACHED
     result = NONE
     while waiting > 0:
         entry = ring[bucket & mask]
@@ -294,6 +296,7 @@ def expand(  # noqa: C901, PLR0912, PLR0915 - one flat loop: a call that hands o
             made += 1
             waiting += 1
     counts[MADE], counts[WAITING], counts[BUCKET], counts[EXPANDED] = made, waiting, bucket, expanded
+    counts[BEST] = best + 1 if best != UNREACHED else 0
     return goal if result != FULL and best != UNREACHED else result
 
 

@@ -22,8 +22,9 @@ Indices = NDArray[np.int32]
 NONE = -1
 """Stands for "no entry" and "no node"."""
 
-MADE, WAITING, BUCKET, EXPANDED = range(4)
-"""Places in `counts`: entries made, entries in buckets, number of the current bucket, expansions."""
+MADE, WAITING, BUCKET, EXPANDED, BEST = range(5)
+"""Places in `counts`: entries made, entries in buckets, number of the current bucket, expansions, and what the best way
+to the goal costs, plus 1; 0 while none is known."""
 
 
 class OpenList(NamedTuple):
@@ -40,7 +41,7 @@ class OpenList(NamedTuple):
 
 def make_open_list(buckets: int, node: Indices, below: Indices) -> OpenList:
     """Return an empty list with at least so many buckets, its entries in the given arrays of equal size."""
-    return OpenList(node, below, np.full(buckets_for(buckets), NONE, np.int32), np.zeros(4, np.int64))
+    return OpenList(node, below, np.full(buckets_for(buckets), NONE, np.int32), np.zeros(5, np.int64))
 
 
 @kernel
