@@ -2,11 +2,17 @@
 
 import gc
 import threading
+import time
+from types import SimpleNamespace
 
 import pytest
 
 from planarm.errors import NoPathError
+from planarm.link.clock import RealClock
+from planarm.notice import silent
+from planarm.operations import replanning
 from planarm.operations.beside import ALLOWED, AsLong, InThread
+from planarm.operations.replanning import run_live
 
 
 def test_a_thread_works_while_its_owner_goes_on():
@@ -68,14 +74,63 @@ def test_a_fault_of_the_program_is_not_kept_for_later():
         AsLong(lambda: 0.0).begin(lambda: 1 // 0, 0.0)
 
 
+def is_searched(one):
+    return any(other is one for other in gc.get_objects())
+
+
 def test_what_was_alive_before_is_not_searched_for_garbage_meanwhile():
     alive = [[]]
-
-    def is_searched():
-        return any(one is alive for one in gc.get_objects())
-
-    assert is_searched()
+    assert is_searched(alive)
     beside = InThread()
-    assert not is_searched()
+    assert not is_searched(alive)
     beside.close()
-    assert is_searched()
+    assert is_searched(alive)
+
+
+def test_who_ends_first_does_not_end_it_for_the_other():
+    alive = [[]]
+    first, second = InThread(), InThread()
+    first.close()
+    first.close()
+    assert not is_searched(alive)
+    second.close()
+    assert is_searched(alive)
+
+
+@pytest.fixture
+def made(monkeypatch):
+    """What live runs made of their own to plan beside them; they fail in their first leg."""
+
+    def fail(_run, _notice):
+        raise ConnectionError("the line")
+
+    threads = []
+    monkeypatch.setattr(replanning, "planning_margin_cm", lambda scene: scene.margin_cm)
+    monkeypatch.setattr(replanning, "_legs", fail)
+    monkeypatch.setattr(replanning, "InThread", lambda: threads.append(InThread()) or threads[-1])
+    return threads
+
+
+def run_on_a_board(scene, beside=None):
+    board = SimpleNamespace(clock=RealClock())
+    run_live(scene, board, None, silent, time.perf_counter, (None, None), beside)
+
+
+def test_garbage_is_searched_again_however_a_live_run_ends(made):
+    alive = [[]]
+    with pytest.raises(ConnectionError, match="the line"):
+        run_on_a_board(SimpleNamespace(margin_cm=1.0))
+    assert len(made) == 1
+    assert is_searched(alive)
+    with pytest.raises(AttributeError, match="margin_cm"):
+        run_on_a_board(SimpleNamespace())
+    assert is_searched(alive)
+
+
+def test_a_live_run_leaves_what_the_caller_brought_as_it_was(made):
+    alive, brought = [[]], AsLong(lambda: 0.0)
+    brought.close = lambda: pytest.fail("it is the caller's")
+    with pytest.raises(ConnectionError):
+        run_on_a_board(SimpleNamespace(margin_cm=1.0), brought)
+    assert not made
+    assert is_searched(alive)

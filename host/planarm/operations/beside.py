@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gc
+import threading
 from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
 from typing import Protocol, TypeVar
@@ -35,6 +36,30 @@ class Beside(Protocol):
         ...
 
 
+class _Garbage:
+    """Leaves what is alive out of the search for garbage until the last one that asked for it asks no more."""
+
+    def __init__(self) -> None:
+        self._lock, self._asking = threading.Lock(), 0
+
+    def leave_out(self) -> None:
+        """Leave out all that is alive now."""
+        with self._lock:
+            self._asking += 1
+            gc.freeze()
+
+    def look_again(self) -> None:
+        """Ask no more; once for each time that it was asked for."""
+        with self._lock:
+            self._asking -= 1
+            if self._asking == 0:
+                gc.unfreeze()
+
+
+_garbage = _Garbage()
+"""The process's: Python knows one search, and one set of what is left out of it."""
+
+
 class InThread:
     """In a thread of its own: for boards, whose time goes on meanwhile.
 
@@ -43,8 +68,9 @@ class InThread:
     """
 
     def __init__(self) -> None:
-        gc.freeze()
         self._pool = ThreadPoolExecutor(max_workers=1)
+        self._closed = False
+        _garbage.leave_out()
 
     def allow_s(self, known_s: float) -> float:
         """Return so many times as long: the stream goes on meanwhile."""
@@ -59,9 +85,11 @@ class InThread:
         return work.done()
 
     def close(self) -> None:
-        """Wait for what is under way."""
+        """Wait for what is under way; a second time there is nothing to do."""
         self._pool.shutdown()
-        gc.unfreeze()
+        if not self._closed:
+            self._closed = True
+            _garbage.look_again()
 
 
 class AsLong:

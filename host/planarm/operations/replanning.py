@@ -17,7 +17,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future
-from contextlib import closing
+from contextlib import closing, nullcontext
 from dataclasses import asdict, dataclass, field, replace
 from functools import partial
 from typing import Any, Protocol
@@ -303,20 +303,25 @@ def run_live(
         notice: told the progress of planning.
         host_s: a clock of the host's.
         first: the roadmap and the plan, when they are there already (`first_plan`).
-        beside: plans while the arm moves; by default in a thread, or as long as that would take in an emulator's time.
+        beside: plans while the arm moves, the caller's to close; by default in a thread, or as long as that would take
+            in an emulator's time.
         warn: told what will be otherwise than planned, as on a slow line.
 
     Raises:
         PlanarmError: the first plan cannot be made, or the line or the board fails.
     """
     task, plan = first or first_plan(scene, notice)
-    own = InThread() if isinstance(transport.clock, RealClock) else AsLong(host_s)
     margin_cm = planning_margin_cm(scene)
-    with closing(own):
-        run = _Run(scene, task, plan, obstacles, transport, host_s, beside or own, margin_cm, warn, plans=[plan])
+    with closing(_own_beside(transport, host_s)) if beside is None else nullcontext(beside) as works:
+        run = _Run(scene, task, plan, obstacles, transport, host_s, works, margin_cm, warn, plans=[plan])
         end_rad, reason = _legs(run, notice)
     met, made, plans = tuple(run.encounters), tuple(run.new_plans), tuple(run.plans)
     return LiveResult(not reason, reason, met, made, plans, end_rad, run.began_s or 0.0)
+
+
+def _own_beside(transport: Transport, host_s: Callable[[], float]) -> Beside:
+    """Return what plans beside a stream when the caller brings nothing that does."""
+    return InThread() if isinstance(transport.clock, RealClock) else AsLong(host_s)
 
 
 def _legs(run: _Run, notice: Notice) -> tuple[Floats, str]:
