@@ -1,6 +1,7 @@
 """Rigid bodies of the plant: energy, an independent derivation, rest where it should be, friction, stops."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -9,6 +10,8 @@ from hypothesis import strategies as st
 
 from planarm_sim.errors import UsageError
 from planarm_sim.plant import Joint, Link, Motor, Plant, Rig
+from planarm_sim.plant.build import fastest_per_s
+from planarm_sim.plant.rigid_body import inertia_constants
 from two_link_reference import swing
 
 S = 16_000_000
@@ -139,11 +142,73 @@ def test_two_runs_are_the_same_and_a_snapshot_goes_back():
     np.testing.assert_array_equal(first.q_rad, after)
 
 
+LIGHT = (Link.rod(0.104, 0.0085), Link.rod(0.268, 0.0108))
+
+
+def light_behind_stiff(stiffness_nm_rad, damping=None, links=LIGHT):
+    """Links of some grams, rotors of 480 g cm2 behind gears of 10: the links, not the rotors, vibrate fastest."""
+    motor = Motor(
+        rotor_inertia_kg_m2=4.8e-5,
+        gear_ratio=10.0,
+        detent_torque_nm=0.0,
+        damping_nm_s=0.0,
+        stiffness_nm_rad=stiffness_nm_rad,
+        stiffness_damping_nm_s=damping,
+    )
+    return Rig(links, (Joint(),) * len(links), (motor,) * len(links), (0.3, 0.0)[: len(links)])
+
+
+@pytest.mark.parametrize("stiffness", [1e3, 1e5, 3e6])
+def test_light_links_behind_stiff_gears_are_computed_in_shorter_steps(stiffness):
+    plant = Plant(light_behind_stiff(stiffness))
+    plant.set_motion((0.3, 0.0), (3.0, -2.0))
+    before = plant.energy_j
+    for k in range(1, 11):
+        plant.run_to(k * S // 100)
+        assert plant.energy_j < 1.001 * before
+
+
+def test_a_step_that_is_too_long_tells_which_setting_of_a_scene_would_help():
+    plant = Plant(light_behind_stiff(1e5), step_cycles=800)
+    plant.set_motion((0.3, 0.0), (3.0, -2.0))
+    with pytest.raises(UsageError, match=r"800 cycles is too long .* lower mechanics\.stiffness_nm_rad"):
+        plant.run_to(S // 10)
+
+
+def test_the_fastest_vibration_is_that_of_two_bodies_on_a_spring():
+    rig = light_behind_stiff(1e5, damping=0.0, links=(Link.rod(0.2, 0.01),))
+    rig = replace(rig, motors=(replace(rig.motors[0], current_a=1e-9),))
+    link, rotor = 0.01 * 0.2**2 / 3.0, 4.8e-5 * 10.0**2
+    assert fastest_per_s(rig) == pytest.approx(math.sqrt(1e5 * (1.0 / link + 1.0 / rotor)), rel=1e-6)
+    damped = replace(rig, motors=(replace(rig.motors[0], stiffness_damping_nm_s=1e3),))
+    assert fastest_per_s(damped) == pytest.approx(1e3 * (1.0 / link + 1.0 / rotor), rel=1e-3)
+
+
+@pytest.mark.parametrize("links", [2, 3, 4])
+def test_no_pose_vibrates_faster_than_the_step_allows_for(links):
+    """Poses at random, and the joints' equations instead of the links' directions."""
+    rng = np.random.default_rng(links)
+    rods = some_links(rng, links)
+    motor = Motor(
+        stiffness_damping_nm_s=0.0, damping_nm_s=0.0, current_a=1e-9, detent_torque_nm=0.0, rotor_inertia_kg_m2=1e-3
+    )
+    most = fastest_per_s(Rig(rods, (Joint(),) * links, (motor,) * links, (0.0,) * links))
+    a, _ = inertia_constants(rods)
+    turns = np.tril(np.ones((links, links)))
+    for q in rng.uniform(-math.pi, math.pi, (200, links)):
+        phi = np.cumsum(q)
+        inertia = turns.T @ (a * np.cos(phi[:, None] - phi)) @ turns
+        inverse = np.linalg.inv(inertia) + np.eye(links) / motor.rotor_inertia_kg_m2
+        assert math.sqrt(motor.stiffness_nm_rad * np.linalg.eigvalsh(inverse).max()) <= (1.0 + 1e-9) * most
+
+
 def test_rigs_that_do_not_fit_are_refused():
     with pytest.raises(UsageError, match="as many joints"):
         Rig(ARM, (Joint(),), (), (0.0, 0.0))
     with pytest.raises(UsageError, match="no inverse"):
         Rig(ARM, (Joint(),) * 2, (Motor(),) * 2, (0.0, 0.0), coupling=((1.0, 0.0), (2.0, 0.0)))
+    with pytest.raises(UsageError, match="last link has no inertia"):
+        Rig((ARM[0], Link(0.2, 0.1, 0.0, 0.0)), (Joint(),) * 2, (), (0.0, 0.0))
 
 
 def test_an_arm_that_somebody_holds_falls_only_after_its_drivers_let_go_of_it():

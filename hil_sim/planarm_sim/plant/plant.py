@@ -171,8 +171,9 @@ class Plant:
             steps -= chunk
         if not np.isfinite(self._state.y).all():
             raise UsageError(
-                f"the arm's motion is no number any more before {self._cycle / CYCLES_PER_S:.6f} s; give the plant a "
-                f"step_cycles below {self._step_cycles}"
+                f"the arm's motion is no number any more before {self._cycle / CYCLES_PER_S:.6f} s: a step of "
+                f"{self._step_cycles} cycles is too long for its stiffest gear or lightest link; lower "
+                "mechanics.stiffness_nm_rad, or make the link heavier"
             )
 
     def _skip_rest(self, steps: int) -> int:

@@ -191,6 +191,12 @@ class Rig:
                 f"a rig has as many joints, motors and start angles as links: {count} links, {len(self.joints)} "
                 f"joints, {len(self.motors)} motors, {len(self.start_rad)} start angles"
             )
+        last = self.links[-1]
+        if not (last.inertia_kg_m2 or last.mass_kg * last.com_m or last.end_mass_kg):
+            raise UsageError(
+                "the last link has no inertia about its joint: give it mechanics.link_inertias_kg_m2 or "
+                "mechanics.end_masses_kg, or mechanics.link_com_share above 0"
+            )
         if np.linalg.matrix_rank(self.coupling_matrix) < count:
             raise UsageError("the coupling matrix has no inverse: the motors would not determine the joints")
 
