@@ -69,7 +69,8 @@ uint8_t Cursor::guess(uint16_t path_ticks) const {
 }
 
 // To the last step before the slice's end; the last slice of a segment takes all that are left. From a guess
-// their number becomes right in some turns. A step just before the end may be left for a run of its own.
+// their number becomes right in some turns. None is left for a run of its own: a run keeps the least
+// interval, two times of a stretched slice may come out a tick closer.
 uint8_t Cursor::go_to_last(const Slice& slice, const Cursor& first) {
     const uint8_t most =
         left_ < step_engine::MAX_RUN_STEPS ? static_cast<uint8_t>(left_) : step_engine::MAX_RUN_STEPS;
@@ -82,7 +83,7 @@ uint8_t Cursor::go_to_last(const Slice& slice, const Cursor& first) {
         *this = first;
         skip(static_cast<uint8_t>(steps - 1));
     }
-    while (steps != most && at_.high + whole_ticks(interval_q16_) + 1 < slice.path_ticks()) {
+    while (steps != most && at_.high + ((interval_q16_ + at_.low) >> 16) < slice.path_ticks()) {
         step();
         ++steps;
     }
@@ -113,7 +114,8 @@ bool Cursor::fit(const Slice& slice, uint16_t first_path, Run& run) const {
     const uint16_t mean = whole_ticks(mean_q16);
     const uint16_t room =
         mean > wire::MIN_INTERVAL_TICKS ? static_cast<uint16_t>(mean - wire::MIN_INTERVAL_TICKS) : 0;
-    if (growth / 2 > room) growth = static_cast<uint16_t>(2 * room);
+    // To the half tick: the least interval has nothing to give.
+    if (growth > static_cast<uint16_t>(2 * room)) growth = static_cast<uint16_t>(2 * room);
     const uint32_t add_q16 = hal::divide_q16(growth, changes);
     const uint32_t half_q16 = multiply_low(add_q16, changes) >> 1;
     run.add_q16 = shrinks ? 0 - add_q16 : add_q16;

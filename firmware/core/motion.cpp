@@ -312,10 +312,10 @@ Progress Motion::serve() {
 }
 
 void Motion::halt() {
-    const bool is_timely = running && !frozen && !step_engine::missed();
     clock::begin_pass();                             // a pass that writes the EEPROM may be long
     clock::begin_pass_at(step_engine::end_steps());  // the segments whose steps have risen are executed
-    if (is_timely) retire();
+    // Asked after the end: behind a step that was missed until then nothing has risen.
+    if (running && !frozen && !step_engine::missed()) retire();
     step_engine::drop_runs();
     clear();
 }

@@ -65,10 +65,12 @@ void Slice::follow(const Way& way) {
     if (s0_ != s1_) reciprocal_ = 0xFFFFFFFF / way.path_ticks;
 }
 
+// The shares add up to a little less than 1. Below a stretch of 1 steps would come closer than the least
+// interval, whose ticks the step interrupt needs all.
 uint32_t Slice::stretch_at(uint16_t path) const {
     if (s0_ == s1_) return s0_;
     const uint16_t share = static_cast<uint16_t>(multiply_high(reciprocal_, path));  // of the slice, in 2^-16
-    return multiply_high(s0_, static_cast<uint16_t>(~share)) + multiply_high(s1_, share);
+    return most_of(multiply_high(s0_, static_cast<uint16_t>(~share)) + multiply_high(s1_, share), ONE);
 }
 
 uint32_t Slice::ticks_at(uint16_t path) const {

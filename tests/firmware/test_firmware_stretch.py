@@ -6,7 +6,9 @@ may be off by a small share of the interval around it; the issue allows one micr
 
 from __future__ import annotations
 
+import random
 from collections import deque
+from itertools import pairwise
 
 import pytest
 from hypothesis import given, settings
@@ -24,10 +26,12 @@ from firmware_board import (
     run_of,
     segment_of,
 )
+from firmware_motions import fast
 from planarm_wire.codec import encoded_bytes
 from planarm_wire.messages import (
     HOLD_CODE,
     JOINTS,
+    MIN_INTERVAL_TICKS,
     NEED_UNIT_TICKS,
     QUEUE_FRAME_BYTES,
     STARVING_TICKS,
@@ -37,6 +41,7 @@ from planarm_wire.messages import (
     Override,
     PinMap,
     Resume,
+    Segment,
     Segments,
     Start,
     State,
@@ -342,3 +347,59 @@ def test_hold_on_the_emulated_chip(emulated_firmware: EmulatedFirmware) -> None:
     player.board.send(Resume())
     player.assert_all_steps_made()
     assert_resumed_as_predicted(player, hold, made)
+
+
+def fill(board: Board, waiting: deque[Segment]) -> Status:
+    """Send what the queue takes of segments without a need."""
+    status = board.ask_now()
+    free = status.free_bytes
+    while waiting and free >= encoded_bytes(message := Segments(160, 160, 0, (waiting[0],))):
+        free -= encoded_bytes(message) + QUEUE_FRAME_BYTES
+        board.send(message)
+        waiting.popleft()
+        board.run(6000)
+    return status
+
+
+@pytest.mark.parametrize("seed", [2, 3, 4, 6])
+def test_no_step_comes_before_the_least_interval(native_firmware: NativeFirmware, seed: int) -> None:
+    # Joint 1 at its top rate; overrides little below 100 %, holds and resumes as chance has them.
+    chance = random.Random(seed)
+    board = Board(native_firmware)
+    board.get_ready()
+    waiting = deque(end_motion(fast(MIN_INTERVAL_TICKS, 1.7, SEGMENT_TICKS, 40)))
+    while waiting and fill(board, waiting).free_bytes > 60:
+        pass
+    board.send(Start(LEAD_TICKS))
+    board.run(LEAD_TICKS)
+    while (status := fill(board, waiting)).state not in (State.READY, State.FAULT):
+        if status.state is State.HELD:
+            board.send(Resume())
+        elif chance.random() < 0.05:
+            board.receive(bytes([HOLD_CODE]))
+        elif chance.random() < 0.5:
+            board.send(Override(chance.choice([100, 100, 99, 98, 95, 70])))
+        board.run(chance.randrange(20_000, 60_000))
+    assert (status.state, status.fault) == (State.READY, Fault.NONE)
+    rises = board.rises(0)
+    assert min(later - tick for tick, later in pairwise(rises)) == MIN_INTERVAL_TICKS
+
+
+def test_no_step_comes_before_the_least_interval_where_the_stretch_begins_and_ends(firmware: Firmware) -> None:
+    # Steps in all phases of slices whose stretch is 1 and a little.
+    board = Board(firmware)
+    board.get_ready()
+    waiting = deque(end_motion(fast(MIN_INTERVAL_TICKS, 2.0, 4 * SEGMENT_TICKS - 30, 30)))
+    while waiting and fill(board, waiting).free_bytes > 60:
+        pass
+    board.send(Start(LEAD_TICKS))
+    board.run(LEAD_TICKS + 100_000)
+    percent = 99
+    while fill(board, waiting).state is State.RUNNING:
+        board.send(Override(percent))
+        percent = 199 - percent
+        board.run(120_000)
+    status = board.ask()
+    assert (status.state, status.fault) == (State.READY, Fault.NONE)
+    rises = board.rises(0)
+    assert min(later - tick for tick, later in pairwise(rises)) == MIN_INTERVAL_TICKS
