@@ -34,7 +34,7 @@ from planarm.plan_file import StoredPlan
 from planarm.record.look import look_at
 from planarm.record.outcome import Outcome, StreamLog
 from planarm.routes.moving_route import find_moving_route
-from planarm.routes.route import Route, find_route
+from planarm.routes.route import SEARCHED, Route, find_route
 from planarm.run_folder.folder import begin_run_folder, finish_run_folder
 from planarm.run_folder.summary import planned_figures, seen_figures, summarise
 from planarm.scene import Scene
@@ -77,7 +77,7 @@ def plan_scene(scene: Scene, notice: Notice, route: Route | None = None, *, advi
     if scene.moving is not None:
         return plan_moving(scene, margin_cm, began_s, notice)
     route = route or find_route(scene, margin_cm, notice)
-    notice("plan", 0.4)
+    notice("plan", SEARCHED)
     motion = motion_along(scene, route, margin_cm, notice)
     trajectory, train, segments = schedule(scene, motion.under, lambda share: notice("plan", 0.6 + 0.2 * share))
     notice("plan", 0.8)

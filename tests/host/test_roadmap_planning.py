@@ -10,8 +10,10 @@ import pytest
 from planarm.dynamics.energy import edge_energy
 from planarm.errors import NoPathError, SceneError
 from planarm.experiments.mpdstar_scenes import case_scene
+from planarm.operations.replanning import first_plan
 from planarm.pipeline import plan_scene, run_scene
 from planarm.roadmap.graph import Roadmap
+from planarm.roadmap.moves import PARTS, all_free, are_free
 from planarm.roadmap.planning import RoadmapTask, ends_rad, way_energy_j
 from planarm.scene import Obstacle, load_scene
 from planarm.search.incremental import GraphPlanner
@@ -36,6 +38,27 @@ def test_a_plan_on_a_roadmap_is_certified_and_its_moves_are_free(algorithm):
     assert all(prove_joint_line(joint_world(SMALL), a, b)[0] == PROVED for a, b in pairwise(poses))
     assert plan.joint.objective == "energy consumed"
     assert 0.0 <= plan.joint.bound <= plan.joint.cost
+
+
+def test_the_roadmap_and_the_plan_tell_how_far_they_are():
+    """The shares rise and end at 1, with many between where the roadmap is built; for `replan`, too."""
+    shares = []
+    RoadmapTask.of(SMALL, SMALL.margin_cm, shares.append)
+    assert shares == pytest.approx([k / PARTS for k in range(1, PARTS + 1)])
+    for planned in (plan_scene, first_plan):
+        told = []
+        planned(SMALL, lambda stage, share, told=told: told.append((stage, share)))
+        shares = [share for stage, share in told if stage == "plan"]
+        assert shares == sorted(shares)
+        assert shares[-1] == 1.0
+        assert len([share for share in shares if 0.0 < share < 0.4]) == PARTS - 1
+
+
+def test_a_roadmap_that_is_built_in_parts_is_the_same():
+    world, poses = joint_world(SMALL), np.random.default_rng(3).uniform(-2.0, 2.0, (60, 2))
+    for count in (0, 1, PARTS - 1, 150):
+        pairs = np.random.default_rng(count).integers(0, 60, (count, 2))
+        assert np.array_equal(all_free(world, poses, pairs), are_free(world, poses, pairs, np.arange(count)))
 
 
 def test_a_plan_on_a_roadmap_runs_on_the_emulated_uno(tmp_path):

@@ -43,7 +43,7 @@ from planarm.operations.verdicts import Verdict, contact_time_s, judge_contact, 
 from planarm.pipeline import plan_scene
 from planarm.plan import Plan
 from planarm.roadmap.planning import RoadmapTask, way_from
-from planarm.routes.route import route_through
+from planarm.routes.route import SEARCHED, roadmap_told, route_through
 from planarm.scene import Obstacle, Scene
 from planarm.streaming.plan_stream import options_for
 from planarm.workspace.joint_proof import joint_world
@@ -348,13 +348,19 @@ def first_plan(scene: Scene, notice: Notice) -> tuple[RoadmapTask, Plan]:
     Its way is left as it was found: one without detours is driven so fast that it can seldom be left at speed.
     """
     margin_cm = planning_margin_cm(scene)
-    task = RoadmapTask.of(scene, margin_cm)
+    task = RoadmapTask.of(scene, margin_cm, roadmap_told(notice))
     task.roadmap.prepare()
     answer = task.planner.solve()
     if not len(answer.nodes):
         raise task.no_way(scene)
     poses = task.roadmap.poses_rad[answer.nodes]
-    return task, plan_scene(scene, notice, route_through(scene, margin_cm, poses, answer.cost))
+    route = route_through(scene, margin_cm, poses, answer.cost)
+    return task, plan_scene(scene, partial(_after_the_roadmap, notice), route)
+
+
+def _after_the_roadmap(notice: Notice, stage: str, share: float) -> None:
+    """Tell a plan's progress, whose beginning was told while its roadmap was built."""
+    notice(stage, max(SEARCHED, share) if stage == "plan" else share)
 
 
 def plan_from(scene: Scene, task: RoadmapTask, rest_rad: Floats, notice: Notice) -> Plan:

@@ -4,7 +4,7 @@ A move between two configurations is two directed edges, 2 k and 2 k + 1: its en
 are computed when they are asked for, both directions at once, and kept; an edge that an obstacle blocks costs infinity.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from math import sqrt
 from typing import Final, NamedTuple, Self
 
@@ -15,7 +15,7 @@ from planarm.dynamics.dc_motor import DcMotors
 from planarm.dynamics.energy import CONSUMED, NET, PEAK_SPEED, TIME, TRAVEL, EdgeModel, edge_costs
 from planarm.dynamics.rigid_body import RigidBody, potential_energy_j
 from planarm.model.shapes import Circle, Polygon, obstacle_set
-from planarm.roadmap.moves import are_free, nearest_pairs
+from planarm.roadmap.moves import all_free, nearest_pairs
 from planarm.roadmap.recheck import all_ends_cm, touched_moves
 from planarm.roadmap.sampling import free_poses, in_memory_order
 from planarm.roadmap.swept import SweptCells
@@ -40,7 +40,15 @@ KINDS: Final[dict[EdgeCost, int]] = {
 class Roadmap:
     """Nodes, moves and costs; obstacles besides the scene's may be added and removed."""
 
-    def __init__(self, world: JointWorld, model: EdgeModel, cost: EdgeCost, poses_rad: Floats, neighbours: int) -> None:
+    def __init__(
+        self,
+        world: JointWorld,
+        model: EdgeModel,
+        cost: EdgeCost,
+        poses_rad: Floats,
+        neighbours: int,
+        told: Callable[[float], None] | None = None,
+    ) -> None:
         """Join each configuration with its nearest ones, by moves that are free.
 
         Args:
@@ -49,9 +57,10 @@ class Roadmap:
             cost: what a move costs.
             poses_rad: free configurations, shape (n, joints).
             neighbours: how many each is joined with, at least; near ones may be joined by the other's choice.
+            told: takes the share of the moves that have been looked at, up to 1.
         """
         pairs = nearest_pairs(world, poses_rad, neighbours)
-        free = are_free(world, poses_rad, pairs, np.arange(len(pairs)))
+        free = all_free(world, poses_rad, pairs, told)
         self.world, self.model, self.cost, self.poses_rad = world, model, cost, poses_rad
         self.pairs: Ints = np.ascontiguousarray(pairs[free])
         """Free moves among the scene's obstacles, shape (m, 2)."""
@@ -65,8 +74,16 @@ class Roadmap:
         self._swept: SweptCells | None = None
 
     @classmethod
-    def of(cls, scene: Scene, margin_cm: float, ends_rad: Sequence[Floats] = ()) -> Self:
+    def of(
+        cls,
+        scene: Scene,
+        margin_cm: float,
+        ends_rad: Sequence[Floats] = (),
+        told: Callable[[float], None] | None = None,
+    ) -> Self:
         """Return the roadmap that a scene describes; the configurations of `ends_rad` are its first nodes.
+
+        Large ones take a while: the share that is done goes to `told`, rising up to 1.
 
         Raises:
             NoPathError: hardly any configuration is free.
@@ -74,7 +91,7 @@ class Roadmap:
         world, spec = joint_world(scene, margin_cm), scene.roadmap
         drawn = in_memory_order(world, free_poses(world, spec.nodes, spec.sampling, scene.planner.seed))
         poses = np.concatenate([np.array(ends_rad, np.float64).reshape(-1, drawn.shape[1]), drawn])
-        return cls(world, edge_model(scene), spec.cost, poses, scene.planner.neighbours)
+        return cls(world, edge_model(scene), spec.cost, poses, scene.planner.neighbours, told)
 
     # -- costs --------------------------------------------------------------------------------------------------------
 

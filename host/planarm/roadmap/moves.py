@@ -9,6 +9,9 @@ and within a piece of width w (1 is the whole move) by w full_p. It is larger th
 off the levers; the pieces get a little smaller, and each costs half.
 """
 
+from collections.abc import Callable
+from itertools import pairwise
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
@@ -22,6 +25,9 @@ from planarm_wire.kernel_cache import bare_kernel, kernel
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Flags = NDArray[np.bool_]
+
+PARTS = 20
+"""After each of so many parts of the moves is told how far their proof is."""
 
 
 def nearest_pairs(world: JointWorld, poses_rad: Floats, neighbours: int) -> Ints:
@@ -37,6 +43,17 @@ def nearest_pairs(world: JointWorld, poses_rad: Floats, neighbours: int) -> Ints
     own = np.repeat(np.arange(len(poses_rad)), count)
     pairs = np.sort(np.stack([own, near.ravel()], axis=1), axis=1)
     return np.unique(pairs[pairs[:, 0] < pairs[:, 1]], axis=0)
+
+
+def all_free(world: JointWorld, poses_rad: Floats, pairs: Ints, told: Callable[[float], None] | None = None) -> Flags:
+    """Tell for each pair, shape (m, 2), whether the move between its poses is free; the share done goes to `told`."""
+    free = np.empty(len(pairs), np.bool_)
+    borders = np.linspace(0, len(pairs), PARTS + 1).astype(np.int64)
+    for part, (begin, end) in enumerate(pairwise(borders), start=1):
+        free[begin:end] = are_free(world, poses_rad, pairs, np.arange(begin, end))
+        if told is not None:
+            told(part / PARTS)
+    return free
 
 
 @kernel

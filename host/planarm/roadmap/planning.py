@@ -1,5 +1,6 @@
 """Planning on a roadmap as a scene says: its ends as configurations, the search, and the way that it finds."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import pairwise, product
 from typing import Final
@@ -48,15 +49,15 @@ class RoadmapTask:
     planner: GraphPlanner
 
     @classmethod
-    def of(cls, scene: Scene, margin_cm: float) -> "RoadmapTask":
-        """Return what the scene describes; nothing is searched yet.
+    def of(cls, scene: Scene, margin_cm: float, told: Callable[[float], None] | None = None) -> "RoadmapTask":
+        """Return what the scene describes; nothing is searched yet. `told` takes the share that is done, up to 1.
 
         Raises:
             SceneError: no allowed pose at start or goal is free.
             NoPathError: hardly any configuration is free.
         """
         ends = ends_rad(scene, joint_world(scene, margin_cm))
-        roadmap = Roadmap.of(scene, margin_cm, ends)
+        roadmap = Roadmap.of(scene, margin_cm, ends, told)
         algorithm: GraphAlgorithm = scene.planner.algorithm  # type: ignore[assignment] # scenes on a roadmap name these
         planner = GraphPlanner(roadmap.graph, roadmap.bounds(), (START, GOAL), algorithm, roadmap.cost_into)
         return cls(roadmap, planner)

@@ -29,6 +29,8 @@ from planarm.workspace.world import FREE, elbow_sides
 
 OPTIMUM = "optimum"
 """The stage in which the any-angle optimum is looked for, where that takes long."""
+SEARCHED = 0.4
+"""The share of the stage "plan" that is done when a route is known."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,14 +58,14 @@ def find_route(scene: Scene, margin_cm: float, notice: Notice | None = None) -> 
         scene: what to do; with a planner on a roadmap there, with a table [joint_space] in joint space, else in tip
             space on each allowed elbow side.
         margin_cm: least distance of a link's centre line to an obstacle.
-        notice: told how far a search for the any-angle optimum is.
+        notice: told how far a roadmap, or a search for the any-angle optimum, is.
 
     Raises:
         SceneError, NoPathError: there is no path; the message, `advice` and `fields` say why and what would help.
         TimingError: the path meets full stretch or fold, and no motion near it can be proved free.
     """
     if scene.planner.on_roadmap:
-        return roadmap_route(scene, margin_cm)
+        return roadmap_route(scene, margin_cm, notice=notice)
     if scene.joint_space:
         return joint_route(scene, margin_cm, scene.joint_space)
     return tip_route(scene, margin_cm, notice)
@@ -115,15 +117,22 @@ def joint_route(scene: Scene, margin_cm: float, spec: JointSpaceSpec) -> Route:
     return smoothed_joint_route(scene, margin_cm, result.route, result.plan_s)
 
 
-def roadmap_route(scene: Scene, margin_cm: float, task: RoadmapTask | None = None) -> Route:
+def roadmap_route(
+    scene: Scene, margin_cm: float, task: RoadmapTask | None = None, notice: Notice | None = None
+) -> Route:
     """Return the route along the cheapest way on the scene's roadmap, or on a known one; errors as `find_route`."""
-    task = task or RoadmapTask.of(scene, margin_cm)
+    task = task or RoadmapTask.of(scene, margin_cm, roadmap_told(notice))
     began_s = perf_counter()
     answer = task.planner.solve()
     search_s = perf_counter() - began_s
     if answer.status is not SearchStatus.FOUND:
         raise task.no_way(scene)
     return smoothed_joint_route(scene, margin_cm, joint_route_of(scene, task.roadmap, answer), search_s)
+
+
+def roadmap_told(notice: Notice | None) -> Told | None:
+    """Return what a roadmap that is built for a plan takes to tell how far it is."""
+    return None if notice is None else lambda share: notice("plan", SEARCHED * share)
 
 
 def route_through(scene: Scene, margin_cm: float, poses_rad: Floats, cost: float) -> Route:
