@@ -6,8 +6,8 @@ stands. "ours" asks the index which moves it can touch, checks those, tells the 
 move clear of it as the roadmap does when it is built (`moves.are_free`), and searches by A*; "quick" is the same with
 the re-check's short cuts (`recheck.touched_moves`: where links stand at configurations is kept). A* runs on the same
 kernels as the repair, and is told the same new costs. "tree" is the repair of all distances alone, which the tool does
-when it is asked again; its first answer is searched from the start (`search.ahead`). CPU time of one core; compare the
-ratios.
+when much more is asked; its first answers are searched from the start (`search.ahead`). CPU time of one core; compare
+the ratios.
 """
 
 # ruff: noqa: T201 - it prints its results
@@ -43,6 +43,7 @@ class Bench:
 
     def __init__(self, nodes: int, cost: EdgeCost, seed: int, links: int) -> None:
         scene = bench_scene(nodes, cost, links=links)
+        self.scene = scene
         self.roadmap = Roadmap.of(scene, scene.margin_cm)
         self.roadmap.prepare()
         self.roadmap.cost_all()

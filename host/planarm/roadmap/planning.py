@@ -141,8 +141,8 @@ def _poses_at(scene: Scene, point_cm: Point) -> list[Floats]:
 def way_from(task: RoadmapTask, world: JointWorld, pose_rad: Floats) -> tuple[Floats, float] | None:
     """Return the best way to the goal from a configuration that is no node: its poses, and what it costs.
 
-    The configuration is joined with its nearest nodes by free moves, and each of them is asked for its distance, which
-    the search knows or repairs.
+    The configuration is joined with its nearest nodes by free moves, and the search is asked for the best of the ways
+    that begin with one of these.
 
     Args:
         task: the roadmap with all obstacles that were added, and its planner.
@@ -161,14 +161,14 @@ def way_from(task: RoadmapTask, world: JointWorld, pose_rad: Floats) -> tuple[Fl
     both = np.concatenate([pose_rad[None], roadmap.poses_rad[near]])
     pairs = np.stack([np.zeros(len(near), np.int64), 1 + np.arange(len(near))], axis=1)
     free = are_free(world, both, pairs, np.arange(len(near)))
-    best: tuple[float, Floats] | None = None
-    for node in near[free][:MOST_ASKED]:
-        task.planner.move_start(int(node))
-        answer = task.planner.solve()
-        step, _ = edge_costs(roadmap.model, KINDS[roadmap.cost], pose_rad, roadmap.poses_rad[node])
-        if len(answer.nodes) and (best is None or step + answer.cost < best[0]):
-            best = (step + answer.cost, roadmap.poses_rad[answer.nodes])
-    return None if best is None else (np.concatenate([pose_rad[None], best[1]]), best[0])
+    asked = near[free][:MOST_ASKED]
+    if not len(asked):
+        return None
+    steps = [edge_costs(roadmap.model, KINDS[roadmap.cost], pose_rad, roadmap.poses_rad[node])[0] for node in asked]
+    answer = task.planner.solve_from(asked, np.array(steps))
+    if not len(answer.nodes):
+        return None
+    return np.concatenate([pose_rad[None], roadmap.poses_rad[answer.nodes]]), answer.cost
 
 
 def ways_on(task: RoadmapTask, world: JointWorld, poses_rad: Floats) -> list[tuple[float, int, Floats]]:

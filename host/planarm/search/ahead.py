@@ -1,4 +1,4 @@
-"""A first answer to costs that rose: searched from the start, with the old distances as bounds.
+"""Answers to costs that rose: searched from the start, or from several, with the old distances as bounds.
 
 While costs only rise, a distance to the goal that was right before is a lower bound of what it is now, and an excellent
 one: an A* from the start that takes it expands little more than what the new way goes around. And a node whose stored
@@ -65,6 +65,12 @@ class Ahead(NamedTuple):
     """C of the last search that expanded from the goal, shape (1,)."""
     limit_start: Ints
     """Its start, shape (1,)."""
+    starts: Ints
+    """Where the search may begin instead of at the start, each node once; shape (n,)."""
+    steps: Floats
+    """What it costs to come to each."""
+    many: Ints
+    """How many of these there are, shape (1,); 0 for the start alone."""
 
 
 def new_ahead(graph: Digraph) -> Ahead:
@@ -81,6 +87,9 @@ def new_ahead(graph: Digraph) -> Ahead:
         waiting=np.zeros(nodes + most, np.int32),
         limit=np.zeros(1),
         limit_start=np.zeros(1, np.int64),
+        starts=np.zeros(nodes, np.int64),
+        steps=np.zeros(nodes),
+        many=np.zeros(1, np.int64),
     )
 
 
@@ -94,7 +103,7 @@ def answer_ahead(
         (DONE, how many nodes the path has, 0 for no path, and its cost); or (what else `search_ahead` returns, 0, 0).
     """
     start = state.ends[START]
-    if needing == BEGIN and (start == ahead.limit_start[0] or state.g[start] < np.inf):
+    if needing == BEGIN and ahead.many[0] == 0 and (start == ahead.limit_start[0] or state.g[start] < np.inf):
         count = stored_way(state, path)
         if count:  # it was the best, and is whole
             _count_nothing(ahead)
@@ -142,7 +151,11 @@ def is_lost(graph: Digraph, state: Lifelong, ahead: Ahead) -> bool:
     flooded, waiting, out_first, out_head = ahead.flooded, ahead.waiting, graph.out_first, graph.out_head
     flooded[:] = 0
     waiting[0] = state.ends[START]
-    flooded[waiting[0]], count, done = 1, 1, 0
+    count, done = max(1, ahead.many[0]), 0
+    for k in range(ahead.many[0]):
+        waiting[k] = ahead.starts[k]
+    for k in range(count):
+        flooded[waiting[k]] = 1
     while done < count:
         u = waiting[done]
         if done % ASKED == 0 and _leads_on(state, ahead, u):
@@ -159,7 +172,7 @@ def is_lost(graph: Digraph, state: Lifelong, ahead: Ahead) -> bool:
                 flooded[v], waiting[np.uint64(count)] = 1, v
                 count += 1
     ahead.counted[4] = count
-    return done == count and flooded[state.ends[GOAL]] == 0
+    return bool(done == count and flooded[state.ends[GOAL]] == 0)
 
 
 @kernel
@@ -210,16 +223,28 @@ def search_ahead(
 
 @kernel
 def begin_ahead(bounds: Bounds, state: Lifelong, ahead: Ahead) -> None:
-    """Clear what the search before left, and begin at the start."""
+    """Clear what the search before left, and begin at the start, or at those that are given."""
     for k in range(ahead.counted[0]):
         u = ahead.visited[k]
         ahead.distance[u], ahead.mark[u] = np.inf, UNTOLD
         take_out(ahead.heap, u)
-    start = state.ends[START]
-    ahead.distance[start], ahead.visited[0] = 0.0, start
-    ahead.counted[0] = 1
+    ahead.counted[0] = 0
     _count_nothing(ahead)
-    put(ahead.heap, start, _to_goal(bounds, state, ahead, start), 0.0)
+    if ahead.many[0] == 0:
+        _begin_at(bounds, state, ahead, state.ends[START], 0.0)
+    for k in range(ahead.many[0]):
+        _begin_at(bounds, state, ahead, ahead.starts[k], ahead.steps[k])
+
+
+@kernel
+def _begin_at(bounds: Bounds, state: Lifelong, ahead: Ahead, u: int, step: float) -> None:
+    """Begin at a node that it costs a step to come to."""
+    ahead.distance[u], ahead.before[u] = step, NOBODY
+    ahead.visited[ahead.counted[0]] = u
+    ahead.counted[0] += 1
+    left = _to_goal(bounds, state, ahead, u)
+    if left < np.inf:
+        put(ahead.heap, u, step + left, left)
 
 
 @kernel
@@ -257,7 +282,7 @@ def _leads_on(state: Lifelong, ahead: Ahead, u: int) -> bool:
 def path_ahead(state: Lifelong, ahead: Ahead, whole: int, path: Ints) -> int:
     """Fill in the nodes from the start by what was searched to `whole`, and on to the goal; return how many."""
     count, u = 0, whole
-    while u != state.ends[START]:
+    while ahead.before[u] != NOBODY:
         u = ahead.before[u]
         count += 1
     u = whole

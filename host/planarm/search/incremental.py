@@ -5,7 +5,7 @@
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -117,7 +117,8 @@ class GraphPlanner:
         self._fresh = True
         self._branch = np.zeros(graph.nodes, np.int64)
         self._roots = 0
-        self._answered = self._fell = False
+        self._fell = False
+        self._spent = 0
         self._ahead = new_ahead(graph)
         self._path = np.zeros(graph.nodes, np.int64)
         self._state = new_lifelong(graph, *ends, stores=algorithm != "d_star_lite")
@@ -132,10 +133,8 @@ class GraphPlanner:
         """Return the best path from the start as it is now."""
         if self._algorithm == "roadmap_a_star":
             self._start_over()
-        if self._roots and not self._answered:
-            self._answered = True
-            if (answer := self._solve_ahead()) is not None:
-                return answer
+        if self._roots and self._spent < self._most_ahead and (answer := self._go_on_ahead(BEGIN)) is not None:
+            return answer
         self._settle()
         anew, before = self._fresh, self._state.counted.copy()
         # A first plan has nothing to repair; D* Lite is left as it is published.
@@ -161,7 +160,7 @@ class GraphPlanner:
             change_costs(self._graph, self._state, edges, costs, self._branch, 0)
         else:
             self._roots, falls = change_costs(self._graph, self._state, edges, costs, self._branch, self._roots)
-            self._answered = False
+            self._spent = 0
             self._fell = self._fell or falls
             if self._fell or self._always_repair:  # old distances are no bounds any more, or nobody wants them
                 self._settle(edges if falls else edges[:0])
@@ -183,7 +182,7 @@ class GraphPlanner:
         outcome, count, cost, self._roots = replan_ahead(
             graph, bounds, state, self._ahead, edges, costs, self._branch, self._roots, self._most_ahead, path
         )
-        self._answered = True
+        self._spent = 0
         if outcome == DONE:
             return self._told_ahead(count, cost)
         if outcome == FELL:
@@ -192,6 +191,38 @@ class GraphPlanner:
         elif outcome != UNCUT and (answer := self._go_on_ahead(outcome)) is not None:
             return answer
         return self.solve()
+
+    def solve_from(self, nodes: Ints, steps: Floats) -> GraphAnswer:
+        """Return the best of the ways that begin at some nodes; its cost is that of the step to the first one, too.
+
+        MPD* Lite asks one search for all of them where it can; else each node is asked.
+
+        Args:
+            nodes: shape (k,), k at least 1, each once.
+            steps: what it costs to come to each, shape (k,), at least 0.
+        """
+        if (together := self._solve_together(nodes, steps)) is not None:
+            return together
+        best: GraphAnswer | None = None
+        for node, step in zip(nodes.tolist(), steps.tolist(), strict=True):
+            self.move_start(node)
+            answer = self.solve()
+            answer = replace(answer, cost=answer.cost + step)
+            best = answer if best is None or answer.cost < best.cost else best
+        assert best is not None, "there is a node"
+        return best
+
+    def _solve_together(self, nodes: Ints, steps: Floats) -> GraphAnswer | None:
+        """Return what `solve_from` does, by one search; None where old distances are no bounds, or much was asked."""
+        repairs = self._state.stores and self._algorithm != "roadmap_a_star" and not self._always_repair
+        if not repairs or self._fresh or self._fell or self._spent >= self._most_ahead:
+            return None
+        ahead, count = self._ahead, len(nodes)
+        ahead.starts[:count], ahead.steps[:count], ahead.many[0] = nodes, steps, count
+        try:
+            return self._go_on_ahead(BEGIN)
+        finally:
+            ahead.many[0] = 0
 
     def _settle(self, fallen: Ints = NO_EDGES) -> None:
         """Make the state ready for a repair, after all changes that were told; or begin anew where that is cheaper."""
@@ -203,27 +234,26 @@ class GraphPlanner:
         if count == TOO_MANY:
             self._start_over()
 
-    def _solve_ahead(self) -> GraphAnswer | None:
-        """Return the best path after costs have risen, by a search from the start; None where that is too much work.
-
-        Distances are settled later.
-        """
-        return self._go_on_ahead(BEGIN)
-
     def _go_on_ahead(self, needing: int) -> GraphAnswer | None:
-        """Go on with a search from the start, from what `answer_ahead` returned last or from BEGIN."""
+        """Return the best path by a search from the start; None where that is too much work.
+
+        It goes on from what `answer_ahead` returned last, or from BEGIN. Distances are settled later.
+        """
+        most = self._most_ahead - self._spent
         while needing != GAVE_UP:
             if needing >= 0:
                 self._ask_for(needing)
             needing, count, cost = answer_ahead(
-                self._graph, self._bounds, self._state, self._ahead, self._most_ahead, needing, self._path
+                self._graph, self._bounds, self._state, self._ahead, most, needing, self._path
             )
             if needing == DONE:
                 return self._told_ahead(count, cost)
+        self._spent = self._most_ahead
         return None
 
     def _told_ahead(self, count: int, cost: float) -> GraphAnswer:
         expanded, updated, looked, _ = self._ahead.counted[1:].tolist()
+        self._spent += expanded
         return self._told(count, cost, Work(expanded, updated, looked, 0, count), anew=False)
 
     def _told(self, count: int, cost: float, work: Work, *, anew: bool) -> GraphAnswer:
