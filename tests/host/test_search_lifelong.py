@@ -124,6 +124,26 @@ def test_all_equal_dijkstra_after_every_change_of_random_graphs(sized):
     assert answers == sized(40, 2000) * 8
 
 
+@pytest.mark.parametrize("algorithm", ["roadmap_a_star", "mpd_star_lite"])
+def test_moves_that_cost_nothing_lead_nobody_round_and_round(algorithm, sized):
+    """Small graphs, most of whose edges cost 0: whole loops of nodes are as far from the goal as each other."""
+    for seed in range(sized(300, 3000)):
+        rng = random.Random(seed)
+        count = rng.randrange(3, 9)
+        tail, head = ([rng.randrange(count) for _ in range(3 * count)] for _ in range(2))
+        graph = digraph(count, tail, head, [float(rng.choice([0, 0, 1, 2])) for _ in tail])
+        planner = GraphPlanner(graph, Bounds.none(count), (0, count - 1), algorithm)
+        for _ in range(6):
+            answer, wanted = planner.solve(), dijkstra(graph, count - 1).get(planner.start, math.inf)
+            assert answer.cost == pytest.approx(wanted), seed
+            assert (answer.status is SearchStatus.FOUND) == (wanted < math.inf), seed
+            assert path_cost(graph, answer.nodes.tolist()) == (wanted if wanted < math.inf else 0.0), seed
+            assert len(set(answer.nodes.tolist())) == len(answer.nodes), seed
+            edges = np.array(rng.sample(range(len(tail)), 2))
+            planner.change(Changes(edges, np.array([float(rng.choice([0, 1, 2, math.inf])) for _ in edges])))
+            planner.move_start(rng.randrange(count))
+
+
 @pytest.mark.parametrize("seed", range(20))
 def test_the_stored_path_is_the_one_that_the_gradient_gives(seed):
     """And is read off with one look a node, where the gradient takes one for each of their successors."""
@@ -558,3 +578,14 @@ def test_an_unreachable_start_has_no_path_and_no_cost():
 def test_what_is_no_graph_is_refused(tail, head, cost, words):
     with pytest.raises(ValueError, match=words):
         digraph(3, tail, head, cost)
+
+
+def test_d_star_lite_refuses_moves_that_cost_nothing():
+    graph = digraph(3, [0, 1], [1, 2], [1.0, 1.0])
+    planner = GraphPlanner(graph, Bounds.none(3), (0, 2), "d_star_lite")
+    assert planner.solve().cost == 2.0
+    with pytest.raises(ValueError, match=r"edge 1 costs 0\.0; D\* Lite needs costs above 0"):
+        planner.change(Changes(np.array([1]), np.zeros(1)))
+    graph.cost[0] = 0.0
+    with pytest.raises(ValueError, match=r"edge 0 costs 0\.0"):
+        GraphPlanner(graph, Bounds.none(3), (0, 2), "d_star_lite")

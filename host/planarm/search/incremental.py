@@ -110,7 +110,12 @@ class GraphPlanner:
             algorithm: A* searches anew each time.
             costing: needed when costs are not known.
             always_repair: MPD* Lite then never starts anew, even where that is cheaper.
+
+        Raises:
+            ValueError: the algorithm is D* Lite, and an edge costs nothing; `change` raises it, too.
         """
+        if algorithm == "d_star_lite":
+            _require_positive(np.arange(len(graph.cost)), graph.cost)
         self._graph, self._bounds, self._algorithm, self._costing = graph, bounds, algorithm, costing
         self._always_repair = always_repair
         self._last_anew = 0
@@ -153,6 +158,7 @@ class GraphPlanner:
         """Tell new costs of edges, known ones; MPD* Lite starts anew where that is cheaper than a repair."""
         edges, costs = changes
         if not self._state.stores:
+            _require_positive(edges, costs)
             change(self._graph, self._bounds, self._state, edges, costs)
         elif self._algorithm == "roadmap_a_star":
             self._graph.cost[edges] = costs
@@ -287,6 +293,15 @@ class GraphPlanner:
         expanded, updated, looked, rescanned = (int(counted[k]) for k in (EXPANDED, UPDATED, LOOKED, RESCANNED))
         status = SearchStatus.FOUND if len(nodes) else SearchStatus.NO_PATH
         return GraphAnswer(status, nodes, cost, Work(expanded, updated, looked, rescanned, read_off), anew)
+
+
+def _require_positive(edges: Ints, costs: Floats) -> None:
+    """D* Lite takes two nodes for near that are only near each other, where going to and fro costs nothing."""
+    if (costs <= 0.0).any():
+        raise ValueError(
+            f"edge {edges[costs <= 0.0][0]} costs {costs[costs <= 0.0][0]}; D* Lite needs costs above 0; "
+            "mpd_star_lite and roadmap_a_star take moves that cost nothing"
+        )
 
 
 def landmarks(graph: Digraph, nodes: Ints) -> Floats:
