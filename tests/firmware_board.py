@@ -269,7 +269,10 @@ class Board:
         slice_ticks: int = 8000,
         head: tuple[int, int, int] = (0, 0, 0),
     ) -> Status:
-        """Play a whole motion, one segment a frame, keeping the queue full; return the first STATUS after its end."""
+        """Play a whole motion, one segment a frame, keeping the queue full; return the first STATUS after its end.
+
+        Keeps no window: for motions whose segments the board reads as fast as they come (Streamer for others).
+        """
         waiting = deque(segments)
         started = False
         free = self.ask_now().free_bytes
@@ -296,7 +299,9 @@ class Board:
         self.send(Query())
         end = self.now + 2_000_000
         while not any(seq == self.seq for seq, _ in self.replies):
-            assert self.now < end, "no answer"
+            assert self.now < end, (
+                "no answer: is more than HOST_WINDOW_BYTES on the line, so that the ring lost the QUERY?"
+            )
             self.run(2000)
         status = self.replies[-1][1]
         assert isinstance(status, Status), status

@@ -78,7 +78,10 @@ uint8_t Cursor::go_to_last(const Slice& slice, const Cursor& first) {
     if (!slice.ends_segment()) steps = guess(static_cast<uint16_t>(slice.path_ticks() - at_.high));
     if (steps > most) steps = most;
     skip(static_cast<uint8_t>(steps - 1));
-    for (uint8_t less = 1; at_.high >= slice.path_ticks(); less = static_cast<uint8_t>(2 * less)) {
+    // Back by what is too far at the interval there (after a move's end it may be 0), the longest where
+    // intervals grow.
+    while (at_.high >= slice.path_ticks()) {
+        const uint32_t less = (at_.high - slice.path_ticks()) / (interval_q16_ >> 16 | 1) + 1;
         steps = steps > less ? static_cast<uint8_t>(steps - less) : 1;
         *this = first;
         skip(static_cast<uint8_t>(steps - 1));

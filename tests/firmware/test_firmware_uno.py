@@ -197,6 +197,22 @@ def test_a_random_motion(
     assert_every_edge(board, motion, status)
 
 
+@pytest.mark.parametrize("least_interval", [246, MIN_INTERVAL_TICKS], ids=["65 k", "71 k"])
+def test_steps_of_fast_growing_intervals_are_found_in_time(
+    emulated_firmware: EmulatedFirmware, least_interval: int
+) -> None:
+    # After both joints at full rate, segments that begin at the least interval: a slice has far fewer steps of the next
+    # than its first interval tells.
+    motion = end_motion(restless(1, least_interval, 484)[470:])
+    board = Board(emulated_firmware)
+    board.get_ready()
+    for segment in motion:
+        board.ask(Segments(0, 0, 0, (segment,)))
+    board.ask(Start(LEAD_TICKS))
+    status = Streamer(board, [], busy_line=True).run(len(motion), 8_000_000)
+    assert_every_edge(board, motion, status)
+
+
 @pytest.mark.parametrize(
     ("interval", "ratio"),
     [(320, 1.0037), (246, 65_041 / 40_170), (246, 65_041 / 65_000), (MIN_INTERVAL_TICKS, 1.0037)],
