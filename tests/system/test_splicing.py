@@ -241,6 +241,7 @@ def test_motions_with_a_limit_of_jerk_or_optimised_for_time_go_on_at_speed(kind,
             last = done.result.plans[-1]
             assert last.certificate.ok
             assert "jerk" not in kind or (largest_jerks(last.trajectory)[0] <= JERK_RAD_S3).all()
+    assert spliced, stops
     if len(verdicts) >= 100:
         counts = {verdict: verdicts.count(verdict) for verdict in ("kept", "avoided", "unavoidable")}
         with capsys.disabled():
