@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import random
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -227,16 +228,23 @@ def test_holds_and_stops_lose_no_step_and_shorten_no_pulse(firmware: EmulatedFir
     assert_pulses(board)
 
 
-def test_a_turn_keeps_dir_from_the_pulse(firmware: EmulatedFirmware) -> None:
-    back = LEAST + MIN_DIR_SETUP_TICKS
+def test_a_turn_keeps_dir_from_the_pulse(firmware: EmulatedFirmware, sized: Callable[[int, int], int]) -> None:
+    # Segments of 4.8 ms: of 3.4 ms, at this load and on a full line, the board reads fewer than it executes.
+    steps = 170
+    duration = steps * LEAST + MIN_DIR_SETUP_TICKS
     segments = []
-    for i in range(20):
-        moves = [run_of(n, first=first, interval=LEAST, positive=i % 2 == 0) for n, first in ((80, 0), (79, 300))]
-        segments.append(segment_of(79 * LEAST + back, *moves))
+    for i in range(sized(40, 400)):
+        joints = (steps, 0), (steps - 1, 300)
+        moves = [run_of(n, first=first, interval=LEAST, positive=i % 2 == 0) for n, first in joints]
+        segments.append(segment_of(duration, *moves))
     board = Board(firmware)
     board.get_ready()
     motion = end_motion(segments)
-    assert_on_schedule(board, motion, board.stream(motion))
+    queue_up(board, motion[:16])
+    board.ask(Start(LEAD_TICKS))
+    status = Streamer(board, motion[16:], busy_line=False).run(len(motion), LEAD_TICKS + 2 * duration * len(motion))
+    assert (status.ring_full, status.crc_errors) == (0, 0)
+    assert_on_schedule(board, motion, status)
 
 
 def test_its_receive_interrupt_is_the_same() -> None:
