@@ -116,6 +116,7 @@ def _until_stops_fit(
     """Time and encode, slower until the device holds the path of every stop from segment `first` on."""
     limit: SpeedLimit | None = None
     road: Road | None = None
+    found = 0
     for left in range(MOST_ROUNDS, 0, -1):
         told(1.0 - left / MOST_ROUNDS)
         trajectory = timing(limit)
@@ -126,5 +127,5 @@ def _until_stops_fit(
         train, plan = encoded(trajectory)
         if not lacks_road(plan, first):
             return trajectory, train, plan
-        road = Road.of(plan, trajectory)
+        road, found = Road.of(plan, trajectory, found), found + 1
     return trajectory, train, plan

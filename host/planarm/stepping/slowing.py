@@ -92,6 +92,10 @@ def last_slices(table: SegmentTable) -> Ticks:
 ROAD_SHARE = 0.95
 """Of the road found, what a slower motion is sure to have about: it is coded anew, into other segments."""
 
+PATIENCE = 3
+"""So many times that share is believed. Where steps are so slow that each is a segment, a slower motion has less road
+again; then less and less is relied on, so that the motion becomes slow enough in the end."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Road:
@@ -108,13 +112,20 @@ class Road:
     end_s: Floats
 
     @classmethod
-    def of(cls, plan: SegmentPlan, trajectory: Trajectory) -> Self:
-        """Return a little less than the road that a plan of a motion was found to have."""
+    def of(cls, plan: SegmentPlan, trajectory: Trajectory, found_before: int = 0) -> Self:
+        """Return a little less than the road that a plan of a motion was found to have.
+
+        Args:
+            plan: made of the motion.
+            trajectory: the motion.
+            found_before: how many roads were found too short before.
+        """
+        share = ROAD_SHARE ** max(1, found_before + 1 - PATIENCE)
         table = table_of(plan)
         held = held_until(table.starts, segment_bytes(table), table.board.queue_bytes)
         s = _path_parameter(trajectory, table.starts[:-1] / TICKS_HZ)
         whole = held >= table.starts[-1]
-        end_s = np.where(whole, trajectory.s[-1], s + ROAD_SHARE * (_path_parameter(trajectory, held / TICKS_HZ) - s))
+        end_s = np.where(whole, trajectory.s[-1], s + share * (_path_parameter(trajectory, held / TICKS_HZ) - s))
         return cls(s, end_s)
 
     def ticks(self, trajectory: Trajectory, at_s: Floats) -> Floats:
