@@ -63,7 +63,7 @@ def test_allowances_come_back_from_the_file(plan, tmp_path):
     [
         (
             {"wiring": "ramps"},
-            "no board executes it: no wiring 'ramps' is known; there are own, cnc_shield; make it anew",
+            "no board executes it: no wiring 'ramps' is known; there are own, own_slow, cnc_shield; make it anew",
         ),
         ({"start_usteps": [0] * 5}, "no board executes it: .*5 joints; the wiring own has pins for 4; make it anew"),
     ],

@@ -62,7 +62,7 @@ def tips_and_links(scene, usteps):
 
 
 @pytest.mark.parametrize(("joints", "wiring"), CASES)
-def test_a_scene_runs_on_its_board(joints, wiring, tmp_path):
+def test_a_scene_runs_on_its_board_and_its_bytes_keep_the_arm_free_by_another_geometry(joints, wiring, tmp_path):
     scene = scene_of(joints, wiring)
     board = scene.board
     assert (board.joints, board.pin_map) == (2 if joints < 3 else 4, wiring)
@@ -75,13 +75,12 @@ def test_a_scene_runs_on_its_board(joints, wiring, tmp_path):
     assert summary["arm_end_tip_error_mm"] < 1.0
     assert summary["max_step_timing_error_ticks"] <= MOST_OFF_TICKS[board.name]
     assert summary.get("path_clock_percent", 100) == 100
+    require_free_bytes(scene, joints, tmp_path / "run.plan")
 
 
-@pytest.mark.parametrize(("joints", "wiring"), CASES)
-def test_the_bytes_of_a_plan_keep_the_arm_free_by_another_geometry(joints, wiring, tmp_path):
-    scene = scene_of(joints, wiring)
-    run_scene(scene, "sim://", tmp_path, no_notice)
-    usteps, steps = read_back(tmp_path / "run.plan")
+def require_free_bytes(scene, joints, plan_file):
+    """The plan's bytes lead to the goal, past the obstacles, at the board's least interval or more."""
+    usteps, steps = read_back(plan_file)
     tips, links = tips_and_links(scene, usteps)
     goal = np.exp(1j * np.cumsum([radians(angle) for angle in GOAL[:joints]])) @ np.array(LENGTHS[:joints])
     assert abs(tips[-1] - goal) < 0.1

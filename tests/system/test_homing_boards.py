@@ -74,8 +74,9 @@ def test_homing_finds_every_switch_and_loses_nothing(joints, wiring, positions):
     assert line.arm.record().lost_full_steps == (0,) * joints
 
 
-def test_a_jammed_rotors_loss_is_told_on_the_last_joint(positions, tmp_path):
-    joints, wiring, joint = 4, "own", 4
+def test_a_jammed_rotors_loss_is_told_on_the_last_joint(positions, tmp_path, sized):
+    joints, wiring = sized(3, 4), "own"
+    joint = joints
     jam = tmp_path / "jam.toml"
     jam.write_text(f'[[faults]]\nkind = "mechanics.stall"\njoint = {joint}\nat_s = {STALLED_S}\nfor_s = 0.6\n')
     scene = switched(joints, wiring)
