@@ -211,9 +211,15 @@ def table(options: argparse.Namespace, links: int) -> None:
     )
     if not options.next_only:
         report("4 cm, anywhere", trials(bench, 2 * options.trials, 4.0, None))
+    next_ones = []
     for diameter in DIAMETERS_CM:
         for place in range(1 if options.next_only else FIFTHS):
-            report(f"{diameter:g} cm, fifth {place + 1} of the way", trials(bench, options.trials, diameter, place))
+            found = trials(bench, options.trials, diameter, place)
+            report(f"{diameter:g} cm, fifth {place + 1} of the way", found)
+            if place == 0:
+                next_ones.append(found)
+    together = {key: np.concatenate([found[key] for found in next_ones]) for key in next_ones[0]}
+    report("all sizes, fifth 1 of the way", together)
 
 
 if __name__ == "__main__":
