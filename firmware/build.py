@@ -92,6 +92,14 @@ def read_settings(environment: str) -> tuple[list[str], list[Path]]:
     return " ".join(flags.splitlines()).replace("-I ", "-I").split(), sources
 
 
+def code_start(elf: Path) -> str:
+    """The address, as the tools take it, where the code begins: the vectors and the tables in flash lie before it."""
+    found = re.search(r"^([0-9a-f]+) \w __ctors_end$", run(["avr-nm", str(elf)]), re.M)
+    if found is None:
+        raise BuildError(f"{elf}: no __ctors_end, where the code begins")
+    return f"0x{found.group(1)}"
+
+
 def require_free_registers(elf: Path, flags: list[str]) -> None:
     """Raise BuildError if any code but the interrupts uses a register that `flags` keep for them (-ffixed-rN).
 
@@ -101,11 +109,7 @@ def require_free_registers(elf: Path, flags: list[str]) -> None:
     """
     numbers = [flag.removeprefix("-ffixed-r") for flag in flags if flag.startswith("-ffixed-r")]
     kept = re.compile(rf"\br(?:{'|'.join(numbers)})\b")
-    # Before __ctors_end are the vectors and the tables in flash, which are no code.
-    code = re.search(r"^([0-9a-f]+) \w __ctors_end$", run(["avr-nm", str(elf)]), re.M)
-    if code is None:
-        raise BuildError(f"{elf}: no __ctors_end, where the code begins")
-    disassemble = ["avr-objdump", "-d", "--no-show-raw-insn", f"--start-address=0x{code.group(1)}", str(elf)]
+    disassemble = ["avr-objdump", "-d", "--no-show-raw-insn", f"--start-address={code_start(elf)}", str(elf)]
     listing = run(disassemble)
     jumps = re.findall(r"\s0x([0-9a-f]+) <(__prologue_saves__|__epilogue_restores__)\b", listing)
     entered = {name: min(int(at, 16) for at, to in jumps if to == name) for _, name in jumps}
@@ -140,7 +144,7 @@ def build_image(out: Path, board: str) -> Path:
         run(["avr-g++", "-c", *PLATFORM_COMPILE, *compile_flags, "-o", str(target), str(source)])
         objects.append(str(target))
     elf, image = out / f"{board}.elf", out / f"{board}.hex"
-    run(["avr-g++", *PLATFORM_LINK, *link_flags, "-o", str(elf), *objects])
+    run(["avr-g++", *PLATFORM_LINK, *link_flags, f"-Wl,-Map={out / board}.map", "-o", str(elf), *objects])
     require_free_registers(elf, flags)
     run(["avr-objcopy", "-O", "ihex", "-R", ".eeprom", str(elf), str(image)])
     return image

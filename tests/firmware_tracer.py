@@ -15,12 +15,16 @@ CLI, WDR = b"\xf8\x94", b"\xa8\x95"
 
 
 class Tracer(EmulatedFirmware):
-    """The emulated board, run by single instructions; notes (vector, cycles) of every interrupt."""
+    """The emulated board, run by single instructions; notes (vector, cycles) of every interrupt.
+
+    `locked` are the ticks at which the main program keeps interrupts off, with the CLI that begins it.
+    """
 
     def __init__(self, image: Path, wiring: Wiring = UNO) -> None:
         super().__init__(image, wiring)
         self.chip = self.uno._chip
         self.done: list[tuple[int, int]] = []
+        self.locked: set[int] = set()
 
     def run(self, ticks: int) -> None:
         end = self.uno.cycle + ticks
@@ -55,8 +59,11 @@ class Tracer(EmulatedFirmware):
 
     def _step(self) -> None:
         chip = self.chip
-        depth = chip.sp
-        chip.run_to(chip.cycle + 1)
+        depth, at, was_locked = chip.sp, chip.cycle, not chip.sreg & INTERRUPTS_ON
+        cli = self._next_instruction() == CLI
+        chip.run_to(at + 1)
+        if was_locked or cli:
+            self.locked.update(range(at, chip.cycle))
         if chip.pc % 2 or not SCHEDULED <= chip.pc // 2 <= TRANSMIT:
             return
         vector, begun = chip.pc // 2, chip.cycle - ENTRY_CYCLES

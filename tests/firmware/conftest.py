@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import importlib.util
 import shutil
 import subprocess
@@ -36,6 +37,16 @@ def builder() -> ModuleType:
     sys.modules[spec.name] = module  # its dataclasses look there for their annotations
     spec.loader.exec_module(module)
     return module
+
+
+@pytest.fixture(scope="session")
+def orderer() -> ModuleType:
+    """firmware/order.py as a module."""
+    sys.path.insert(0, str(ROOT / "firmware"))
+    try:
+        return importlib.import_module("order")
+    finally:
+        sys.path.pop(0)
 
 
 @pytest.fixture(scope="session")
