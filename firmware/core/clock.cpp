@@ -65,8 +65,8 @@ void stand_before(uint32_t ticks) {
     // Whole laps are 2^16 ticks.
     const uint16_t laps = static_cast<uint16_t>(((at.begun_ticks - ticks) >> 16) + 1);
     const uint32_t back_ticks = static_cast<uint32_t>(laps) << 16;
-    at.stood_ticks += back_ticks;
-    at.begun_ticks -= back_ticks;
+    increase(at.stood_ticks, back_ticks);
+    increase(at.begun_ticks, 0 - back_ticks);
 }
 
 void end_standing() {

@@ -1,6 +1,7 @@
 #include "firmware.h"
 
 #include "clock.h"
+#include "fixed.h"
 #include "frame_receiver.h"
 #include "hal_journal.h"
 #include "hal_pins.h"
@@ -31,18 +32,20 @@ uint8_t seen_holds;
 uint8_t passes;
 
 // Spreads counts that follow each other over all 32 bits; every step can be undone, so different counts stay
-// different. The multiplier is 2^32 over the golden ratio, made odd.
+// different. The multiplier, 2^16 over the golden ratio, is odd.
 uint32_t mix(uint32_t count) {
-    const uint32_t mixed = (count + 1) * 0x9E3779B1u;
+    uint32_t mixed = count + 1;
+    for (uint8_t turn = 0; turn < 2; ++turn) mixed = multiply_low(mixed, 0x9E37);
     return mixed ^ (mixed >> 16);
 }
 
-void tell(supervisor::Event event) {
+// Functions of their own: each is called from many places.
+[[gnu::noinline]] void tell(supervisor::Event event) {
     supervisor::apply(event);
     session::announce();
 }
 
-void fail(wire::Fault fault, uint8_t detail = 0) {
+[[gnu::noinline]] void fail(wire::Fault fault, uint8_t detail = 0) {
     supervisor::fail(fault, detail);
     session::announce();
 }
@@ -139,13 +142,13 @@ void serve_rest() {
 }
 
 void receive() {
-    const uint8_t* bytes;
-    const uint8_t count = hal::serial_peek(bytes);
-    if (count == 0) return;
-    FrameReceiver::Event event;
-    hal::serial_drop(receiver.receive(bytes, count < BYTES_A_PASS ? count : BYTES_A_PASS, event));
-    if (event == FrameReceiver::Event::DAMAGED) session::on_damage();
-    if (event == FrameReceiver::Event::FRAME) session::on_frame(receiver.frame());
+    const hal::SerialBytes waiting = hal::serial_peek();
+    if (waiting.count == 0) return;
+    const uint8_t count = waiting.count < BYTES_A_PASS ? waiting.count : BYTES_A_PASS;
+    const FrameReceiver::Received received = receiver.receive(waiting.at, count);
+    hal::serial_drop(received.bytes);
+    if (received.event == FrameReceiver::Event::DAMAGED) session::on_damage();
+    if (received.event == FrameReceiver::Event::FRAME) session::on_frame(receiver.frame());
 }
 
 }  // namespace
@@ -161,7 +164,7 @@ void set_up(const Boot& boot, uint32_t now_ticks) {
     supervisor::reset();
     session::reset();
     seen_holds = hal::hold_count();
-    reply::set_boot({mix(boot.count), boot.cause, boot.was_enabled});
+    reply::set_boot(mix(boot.count), boot.cause, boot.was_enabled);
 }
 
 void pass() {

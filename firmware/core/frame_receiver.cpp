@@ -13,30 +13,31 @@ void FrameReceiver::reset() {
     damaged_ = false;
 }
 
-uint8_t FrameReceiver::receive(const uint8_t* bytes, uint8_t count, Event& event) {
-    event = Event::NONE;
+FrameReceiver::Received FrameReceiver::receive(const uint8_t* bytes, uint8_t count) {
+    Event event = Event::NONE;
     uint8_t used = 0;
     do {
-        uint8_t byte = bytes[used];
+        const uint8_t byte = bytes[used];
         if (is_special(byte)) {
             ++used;
             event = special(byte);
-        } else if (escaped_) {
-            ++used;
-            escaped_ = false;
-            byte ^= wire::ESCAPE_XOR;
-            damaged_ = damaged_ || !is_special(byte);
-            append(&byte, 1);
         } else {
             used = static_cast<uint8_t>(used + append(bytes + used, static_cast<uint8_t>(count - used)));
         }
     } while (used != count && event == Event::NONE);
-    return used;
+    return {used, event};
 }
 
-// Keeps bytes until one is special or the frame is as long as known, an escaped one whatever it is; returns
+// Keeps bytes until one is special or the frame is as long as known, or one that is escaped; returns
 // how many. Those of a damaged frame go nowhere.
 uint8_t FrameReceiver::append(const uint8_t* bytes, uint8_t count) {
+    uint8_t flipped = 0;
+    if (escaped_) {
+        escaped_ = false;
+        flipped = wire::ESCAPE_XOR;
+        count = 1;
+        damaged_ = damaged_ || !is_special(*bytes ^ flipped);
+    }
     damaged_ = damaged_ || count_ == end_;  // longer than its header says
     if (damaged_) return 1;
     uint8_t room = static_cast<uint8_t>((count_ < PAYLOAD_AT ? PAYLOAD_AT : end_) - count_);
@@ -45,7 +46,7 @@ uint8_t FrameReceiver::append(const uint8_t* bytes, uint8_t count) {
     uint8_t left = room;
     uint16_t crc = crc_;
     do {
-        const uint8_t byte = *bytes++;
+        const uint8_t byte = *bytes++ ^ flipped;
         *at++ = byte;
         crc = hal::crc_update(crc, byte);
     } while (--left != 0 && !is_special(*bytes));

@@ -30,9 +30,14 @@ class FrameReceiver {
     // Before the first byte.
     void reset();
 
-    // Takes bytes of the line, at least one, as far as the first event; returns how many. DAMAGED is told
+    struct Received {
+        uint8_t bytes;
+        Event event;
+    };
+
+    // Takes bytes of the line, at least one, as far as the first event. DAMAGED is told
     // once for each delimiter that ends something other than a good frame. On the Uno 58 cycles a byte.
-    uint8_t receive(const uint8_t* bytes, uint8_t count, Event& event);
+    Received receive(const uint8_t* bytes, uint8_t count);
 
     // The frame of the last FRAME event; it stays until the next byte is received.
     const Frame& frame() const { return frame_; }

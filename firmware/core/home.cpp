@@ -29,7 +29,7 @@ struct Homing {
 
 Homing homing;
 
-void enter(Homing& at, Phase phase, uint32_t start_ticks) {
+[[gnu::noinline]] void enter(Homing& at, Phase phase, uint32_t start_ticks) {
     at.phase = phase;
     at.next_ticks = start_ticks;
     if (phase == Phase::APPROACH) return;

@@ -11,13 +11,18 @@ namespace inputs {
 namespace {
 
 struct Inputs {
-    uint8_t raw;     // bit j: joint j, hit
-    uint8_t steady;  // debounced
-    uint8_t left;    // hit before the motion began, and not yet open since
-    uint32_t changed_ticks;
+    uint8_t raw;       // bit j: joint j, hit
+    uint8_t steady;    // debounced
+    uint8_t left;      // hit before the motion began, and not yet open since
+    uint16_t changed;  // when `raw` did, in 256 ticks
 };
 
 Inputs state;
+
+// In 256 ticks, modulo a second; one more for what that cuts off.
+constexpr uint16_t STEADY = wire::DEBOUNCE_TICKS / 256 + 2;
+
+uint16_t now_256() { return static_cast<uint16_t>(clock::pass_ticks() >> 8); }
 
 constexpr uint8_t JOINTS_MASK = (1 << wire::JOINTS) - 1;
 
@@ -34,7 +39,7 @@ bool is_set(uint8_t bits, uint8_t joint) { return ((bits >> joint) & 1) != 0; }
 void reset() {
     Inputs& at = hal::by_base(state);
     at.raw = at.steady = at.left = read();
-    at.changed_ticks = clock::pass_ticks();
+    at.changed = now_256();
 }
 
 void serve() {
@@ -42,8 +47,8 @@ void serve() {
     const uint8_t now = read();
     if (now != at.raw) {
         at.raw = now;
-        at.changed_ticks = clock::pass_ticks();
-    } else if (at.steady != now && clock::pass_ticks() - at.changed_ticks >= wire::DEBOUNCE_TICKS) {
+        at.changed = now_256();
+    } else if (at.steady != now && static_cast<uint16_t>(now_256() - at.changed) >= STEADY) {
         at.steady = now;
         at.left &= now;
     }

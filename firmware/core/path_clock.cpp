@@ -27,7 +27,7 @@ uint32_t sped_up(uint32_t stretch, uint32_t rate_path) {
         const uint32_t growth = multiply_q16(end, relative);
         const uint32_t gap = stretch - end;
         if (growth <= gap) break;
-        const uint32_t slope = ((ONE + 3 * relative) >> 8) + 1;
+        const uint32_t slope = ((ONE + multiply_low(relative, 3)) >> 8) + 1;
         end -= ((growth - gap) / slope) << 8;
     }
     return end;

@@ -12,16 +12,16 @@ namespace power {
 
 namespace {
 
-constexpr uint32_t TICKS_A_MS = wire::TICKS_HZ / 1000;
+constexpr uint16_t TICKS_A_MS = wire::TICKS_HZ / 1000;
 // The mark in EEPROM takes four bytes of 3.4 ms each.
-constexpr uint32_t MARK_TICKS = 20 * TICKS_A_MS;
+constexpr uint32_t MARK_TICKS = 20 * static_cast<uint32_t>(TICKS_A_MS);
 
 struct Power {
     bool energised;
     bool waking;
     uint32_t awake_ticks;
-    uint32_t idle_for_ms;
-    uint32_t counted_ticks;
+    uint32_t idle_left_ms;   // until the drivers are released; 0: never
+    uint16_t counted_ticks;  // where the last of its milliseconds began, modulo 2^16
 };
 
 Power power;
@@ -37,8 +37,7 @@ void energise() {
     hal::drivers_enable(true);
     Power& at = hal::by_base(power);
     at.energised = at.waking = true;
-    const uint32_t wake_ticks = settings::config.wake_ticks;
-    at.awake_ticks = clock::pass_ticks() + (wake_ticks > MARK_TICKS ? wake_ticks : MARK_TICKS);
+    at.awake_ticks = clock::pass_ticks() + most_of(settings::config.wake_ticks, MARK_TICKS);
 }
 
 void release() {
@@ -59,18 +58,18 @@ uint32_t ready_ticks() {
 
 void note_activity() {
     Power& at = hal::by_base(power);
-    at.idle_for_ms = 0;
-    at.counted_ticks = clock::pass_ticks();
+    at.idle_left_ms = settings::config.idle_ms;
+    at.counted_ticks = static_cast<uint16_t>(clock::pass_ticks());
 }
 
+// A pass of more than 4.1 ms, as when the EEPROM is waited for, counts for less.
 bool is_idle_too_long() {
     Power& at = hal::by_base(power);
-    if (clock::pass_ticks() - at.counted_ticks >= TICKS_A_MS) {
-        increase(at.counted_ticks, TICKS_A_MS);
-        ++at.idle_for_ms;
-    }
-    const uint32_t idle_ms = settings::config.idle_ms;
-    return idle_ms != 0 && at.energised && at.idle_for_ms >= idle_ms;
+    if (static_cast<uint16_t>(static_cast<uint16_t>(clock::pass_ticks()) - at.counted_ticks) < TICKS_A_MS)
+        return false;
+    at.counted_ticks = static_cast<uint16_t>(at.counted_ticks + TICKS_A_MS);
+    if (at.idle_left_ms == 0) return false;
+    return --at.idle_left_ms == 0;
 }
 
 }  // namespace power

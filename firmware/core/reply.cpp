@@ -1,5 +1,6 @@
 #include "reply.h"
 
+#include "hal_base.h"
 #include "hal_crc.h"
 #include "hal_serial.h"
 #include "hal_signals.h"
@@ -13,6 +14,12 @@ namespace planarm {
 namespace reply {
 
 namespace {
+
+struct Boot {
+    uint32_t nonce;
+    wire::Reset cause;
+    bool interrupted;
+};
 
 Boot last_boot;
 
@@ -46,19 +53,22 @@ void send(uint8_t seq, wire::MessageType type, uint8_t size) {
 
 }  // namespace
 
-void set_boot(const Boot& boot) { last_boot = boot; }
+void set_boot(uint32_t nonce, wire::Reset cause, bool interrupted) {
+    hal::by_base(last_boot) = {nonce, cause, interrupted};
+}
 
 void send_welcome(const session::Report& report, uint32_t host_nonce) {
     wire::Welcome& told = payload<wire::Welcome>();
     told.protocol_version = wire::PROTOCOL_VERSION;
     told.host_nonce = host_nonce;
-    told.boot_nonce = last_boot.nonce;
+    const Boot& boot = hal::by_base(last_boot);
+    told.boot_nonce = boot.nonce;
     told.spec_hash = wire::SPEC_HASH;
     told.firmware_version[0] = VERSION_MAJOR;
     told.firmware_version[1] = VERSION_MINOR;
     told.firmware_version[2] = VERSION_PATCH;
-    told.reset_cause = last_boot.cause;
-    told.interrupted = last_boot.interrupted ? 1 : 0;
+    told.reset_cause = boot.cause;
+    told.interrupted = boot.interrupted ? 1 : 0;
     told.joints = wire::JOINTS;
     motion::tell_ledger(told.ledger);
     send(report.expected_seq, wire::MessageType::WELCOME, sizeof(told));

@@ -8,15 +8,9 @@
 namespace planarm {
 namespace reply {
 
-// What WELCOME tells of the last start.
-struct Boot {
-    uint32_t nonce;  // differs after every reset
-    wire::Reset cause;
-    bool interrupted;
-};
-
-// For start-up.
-void set_boot(const Boot& boot);
+// What WELCOME tells of the last start, for start-up: a nonce that differs after every reset, its cause, and
+// whether the drivers were enabled then.
+void set_boot(uint32_t nonce, wire::Reset cause, bool interrupted);
 
 // Begin to send a frame; hal::serial_can_send must hold.
 void send_welcome(const session::Report& report, uint32_t host_nonce);

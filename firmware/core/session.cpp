@@ -17,46 +17,58 @@ using wire::Result;
 
 namespace {
 
-bool is_open;  // a HELLO with the right version came: the sequence is defined
-Report report;
-uint32_t host_nonce;
-bool welcome_due;
-bool status_due;
+struct Session {
+    bool is_open;  // a HELLO with the right version came: the sequence is defined
+    bool welcome_due;
+    bool status_due;
+    Report report;
+    uint32_t host_nonce;
+    const Frame* checking;  // a SEGMENTS frame that is being carried out, segment by segment
+};
 
-const Frame* checking;  // a SEGMENTS frame that is being carried out, segment by segment
+Session session;
 
-void note_refusal(Result result, uint8_t seq) {
+Session& current() { return hal::by_base(session); }
+
+[[gnu::noinline]] void note_refusal(Result result, uint8_t seq) {
+    Report& report = current().report;
     if (static_cast<int8_t>(result) >= 0 || report.refusal != Result::OK) return;
     report.refusal = result;
     report.refusal_seq = seq;
 }
 
+void forget_refusal(Session& at) {
+    at.report.refusal = Result::OK;
+    at.report.refusal_seq = 0;
+}
+
 // Ends the frame that was expected: it counts as carried out unless it is to be sent again.
 void finish(Result result) {
-    status_due = true;
+    Session& at = current();
+    at.status_due = true;
     if (result == Result::BUSY) return;
-    note_refusal(result, report.expected_seq);
-    ++report.expected_seq;
+    note_refusal(result, at.report.expected_seq);
+    ++at.report.expected_seq;
 }
 
 void hello(const Frame& frame) {
+    Session& at = current();
     if (frame.length != sizeof(wire::Hello)) {
         note_refusal(Result::MALFORMED, frame.seq);
-        status_due = true;
+        at.status_due = true;
         return;
     }
     const wire::Hello& told = frame.as<wire::Hello>();
-    host_nonce = told.host_nonce;
-    report.expected_seq = static_cast<uint8_t>(frame.seq + 1);
-    report.refusal = Result::OK;
-    report.refusal_seq = 0;
-    is_open = told.protocol_version == wire::PROTOCOL_VERSION;
-    if (!is_open) note_refusal(Result::VERSION, frame.seq);
-    welcome_due = true;
+    at.host_nonce = told.host_nonce;
+    at.report.expected_seq = static_cast<uint8_t>(frame.seq + 1);
+    forget_refusal(at);
+    at.is_open = told.protocol_version == wire::PROTOCOL_VERSION;
+    if (!at.is_open) note_refusal(Result::VERSION, frame.seq);
+    at.welcome_due = true;
 }
 
 // A motion with a segment left out must not go on.
-Result refuse(Result result) {
+[[gnu::noinline]] Result refuse(Result result) {
     supervisor::fail(result == Result::WRONG_STATE ? Fault::QUEUE_MISUSE : Fault::BAD_SEGMENT);
     return result;
 }
@@ -81,7 +93,8 @@ bool next_segment(Result& result) {
     if (motion::is_too_late()) {
         result = Result::WRONG_STATE;
     } else {
-        intake::commit(checking->payload, checking->length);
+        const Frame& frame = *current().checking;
+        intake::commit(frame.payload, frame.length);
     }
     return true;
 }
@@ -92,63 +105,59 @@ void begin_segments(const Frame& frame) {
     const Result result = intake::begin_check(frame.payload, frame.length);
     if (result == Result::BUSY) return finish(result);
     if (result != Result::OK) return finish(refuse(result));
-    checking = &frame;
+    current().checking = &frame;
 }
 
 void execute(const Frame& frame) {
     if (static_cast<MessageType>(frame.type) == MessageType::SEGMENTS) return begin_segments(frame);
     const Result result = commands::execute(frame);
     if (result == Result::OK && static_cast<MessageType>(frame.type) == MessageType::CLEAR) {
-        report.refusal = Result::OK;
-        report.refusal_seq = 0;
+        forget_refusal(current());
     }
     finish(result);
 }
 
 }  // namespace
 
-void reset() {
-    hal::clear_at_start(is_open);
-    hal::clear_at_start(report);
-    hal::clear_at_start(welcome_due);
-    hal::clear_at_start(status_due);
-    hal::clear_at_start(checking);
-}
+void reset() { hal::clear_at_start(session); }
 
 void on_frame(const Frame& frame) {
+    Session& at = current();
     if (static_cast<MessageType>(frame.type) == MessageType::HELLO) {
         hello(frame);
-    } else if (is_open && frame.seq == report.expected_seq) {
+    } else if (at.is_open && frame.seq == at.report.expected_seq) {
         execute(frame);
     } else {
-        status_due = true;
+        at.status_due = true;
     }
 }
 
 void on_damage() {
-    ++report.crc_errors;
-    status_due = true;
+    Session& at = current();
+    ++at.report.crc_errors;
+    at.status_due = true;
 }
 
-bool is_busy() { return checking != nullptr; }
+bool is_busy() { return session.checking != nullptr; }
 
 void advance() {
     Result result;
     if (!next_segment(result)) return;
-    checking = nullptr;
+    session.checking = nullptr;
     finish(result);
 }
 
-void announce() { status_due = true; }
+void announce() { session.status_due = true; }
 
 bool send_reply() {
-    if (!welcome_due && !status_due) return false;
-    if (welcome_due) {
-        welcome_due = false;
-        reply::send_welcome(report, host_nonce);
+    Session& at = current();
+    if (!at.welcome_due && !at.status_due) return false;
+    if (at.welcome_due) {
+        at.welcome_due = false;
+        reply::send_welcome(at.report, at.host_nonce);
     } else {
-        status_due = false;
-        reply::send_status(report);
+        at.status_due = false;
+        reply::send_status(at.report);
     }
     return true;
 }

@@ -14,11 +14,13 @@ using wire::State;
 
 namespace {
 
-// A row of the table in two bytes: event, state, next state and outcome.
+// A row of the table in two bytes: state and next state, event and outcome. Each is found by a mask of its
+// byte.
 constexpr uint16_t row(Event event, State from, State to, Outcome outcome) {
-    return static_cast<uint16_t>(static_cast<unsigned>(event) << 11 | static_cast<unsigned>(from) << 7 |
-                                 static_cast<unsigned>(to) << 3 | static_cast<unsigned>(outcome));
+    return static_cast<uint16_t>(static_cast<unsigned>(from) << 12 | static_cast<unsigned>(to) << 8 |
+                                 static_cast<unsigned>(event) << 3 | static_cast<unsigned>(outcome));
 }
+constexpr uint16_t ASKED = 0xF0F8;  // state and event
 static_assert(static_cast<uint8_t>(Event::CLEAR_KEPT) < 32 && static_cast<uint8_t>(State::HOMING) < 16 &&
                   static_cast<uint8_t>(Outcome::FORGET) < 8 &&
                   row(Event::ENABLE, State::IDLE, State::READY, Outcome::ENERGISE) != 0,
@@ -95,13 +97,20 @@ uint8_t latched_detail;
 
 // The event's row in this state; 0 when there is none: the first row is not 0.
 uint16_t find(Event event) {
-    const uint16_t wanted = row(event, current_state, State::IDLE, Outcome::NONE) >> 7;
+    const uint16_t wanted = row(event, current_state, State::IDLE, Outcome::NONE);
     for (const uint16_t& entry : ROWS) {
         const uint16_t found = hal::flash_word(&entry);
-        if (found >> 7 == wanted) return found;
+        if (((found ^ wanted) & ASKED) == 0) return found;
     }
     return 0;
 }
+
+constexpr motion::Wish wish_of(Outcome outcome) {
+    return static_cast<motion::Wish>(static_cast<uint8_t>(outcome) - static_cast<uint8_t>(Outcome::GO));
+}
+static_assert(wish_of(Outcome::REST) == motion::Wish::REST &&
+                  wish_of(Outcome::REST_QUICKLY) == motion::Wish::REST_QUICKLY,
+              "the same order");
 
 void carry_out(Outcome outcome) {
     switch (outcome) {
@@ -120,11 +129,9 @@ void carry_out(Outcome outcome) {
             home::cancel();
             return motion::halt();
         case Outcome::GO:
-            return motion::set_wish(motion::Wish::GO);
         case Outcome::REST:
-            return motion::set_wish(motion::Wish::REST);
         case Outcome::REST_QUICKLY:
-            return motion::set_wish(motion::Wish::REST_QUICKLY);
+            return motion::set_wish(wish_of(outcome));
     }
 }
 
@@ -160,7 +167,7 @@ bool allows(Event event) { return find(event) != 0; }
 void apply(Event event) {
     const uint16_t found = find(event);
     if (found == 0) return;
-    current_state = static_cast<State>((found >> 3) & 0x0F);
+    current_state = static_cast<State>((found >> 8) & 0x0F);
     power::note_activity();
     carry_out(static_cast<Outcome>(found & 0x07));
 }

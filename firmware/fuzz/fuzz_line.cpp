@@ -103,8 +103,7 @@ class Witness {
     }
 
     void hear(uint8_t byte) {
-        FrameReceiver::Event event;
-        receiver_.receive(&byte, 1, event);
+        const FrameReceiver::Event event = receiver_.receive(&byte, 1).event;
         require(event != FrameReceiver::Event::DAMAGED, "a damaged frame was sent");
         if (event == FrameReceiver::Event::FRAME) expected_seq_ = receiver_.frame().seq;
     }

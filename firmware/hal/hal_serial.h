@@ -12,8 +12,13 @@ namespace wire = planarm::wire;
 // Switches the USART on. Interrupts are still off.
 void serial_init();
 
-// The oldest received bytes, as many as lie together; returns how many. They stay until they are dropped.
-uint8_t serial_peek(const uint8_t*& bytes);
+struct SerialBytes {
+    const uint8_t* at;
+    uint8_t count;
+};
+
+// The oldest received bytes, as many as lie together. They stay until they are dropped.
+SerialBytes serial_peek();
 void serial_drop(uint8_t count);
 
 // True when no reply is being sent.

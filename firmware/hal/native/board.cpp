@@ -209,13 +209,11 @@ void emergency_clear() { uno.emergencies_cleared = uno.emergencies_told; }
 
 void watchdog_feed() {}
 
-uint8_t serial_peek(const uint8_t*& bytes) {
+SerialBytes serial_peek() {
     const uint8_t at = uno.ring_tail % planarm::wire::RX_RING_BYTES;
     const uint8_t count = static_cast<uint8_t>(uno.ring_head - uno.ring_tail);
-    bytes = uno.ring + at;
-    return count < planarm::wire::RX_RING_BYTES - at
-               ? count
-               : static_cast<uint8_t>(planarm::wire::RX_RING_BYTES - at);
+    const uint8_t together = static_cast<uint8_t>(planarm::wire::RX_RING_BYTES - at);
+    return {uno.ring + at, count < together ? count : together};
 }
 
 void serial_drop(uint8_t count) { uno.ring_tail = static_cast<uint8_t>(uno.ring_tail + count); }

@@ -56,14 +56,13 @@ void serial_init() {
 }
 
 // The ring's bytes are not volatile: those behind the head are the interrupt's, the others are not written.
-uint8_t serial_peek(const uint8_t*& bytes) {
+SerialBytes serial_peek() {
     const uint8_t tail = RING_TAIL;
     const uint8_t count = static_cast<uint8_t>(RING_HEAD - tail);
     compiler_barrier();
     const uint8_t at = tail & (RX_RING_BYTES - 1);
     const uint8_t together = static_cast<uint8_t>(RX_RING_BYTES - at);
-    bytes = ring + at;
-    return count < together ? count : together;
+    return {ring + at, count < together ? count : together};
 }
 
 void serial_drop(uint8_t count) {

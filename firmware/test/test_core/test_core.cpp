@@ -84,9 +84,10 @@ std::vector<FrameReceiver::Event> events(FrameReceiver& receiver, const Bytes& l
             static_cast<uint8_t>(1 + random_below(left < 20 ? static_cast<uint32_t>(left) : 20));
         size_t used = 0;
         while (used < piece) {
-            FrameReceiver::Event event;
-            used += receiver.receive(line.data() + at + used, static_cast<uint8_t>(piece - used), event);
-            if (event != FrameReceiver::Event::NONE) found.push_back(event);
+            const FrameReceiver::Received received =
+                receiver.receive(line.data() + at + used, static_cast<uint8_t>(piece - used));
+            used += received.bytes;
+            if (received.event != FrameReceiver::Event::NONE) found.push_back(received.event);
         }
         at += used;
     }
