@@ -10,6 +10,7 @@
     ├── PlanFileError     E205  the file is no plan, or cannot be read
     ├── JournalError      E207  a run's journal is damaged, or is none
     ├── CaptureError      E206  the recording of the pins cannot be read, or does not show what is asked
+    ├── ClusterError      E208  a campaign's cluster is gone: its scheduler, or all of its workers
     ├── NoPathError       E301  start and goal are fine, but no collision-free path joins them
     ├── TimingError       E401  the path cannot be timed within the joints' limits
     ├── CertificateError  E402  a check of the finished plan failed
@@ -108,6 +109,13 @@ class CaptureError(PlanarmError):
 
     exit_code: ClassVar[int] = 2
     code: ClassVar[str] = "E206"
+
+
+class ClusterError(PlanarmError):
+    """A campaign's cluster is gone: its scheduler, or all of its workers."""
+
+    exit_code: ClassVar[int] = 2
+    code: ClassVar[str] = "E208"
 
 
 class NoPathError(PlanarmError):

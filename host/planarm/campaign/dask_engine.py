@@ -3,16 +3,21 @@
 from __future__ import annotations
 
 import importlib
-from collections import deque
-from collections.abc import Iterator
+import queue
+import time
+from collections.abc import Iterable, Iterator
+from concurrent.futures import CancelledError
 from itertools import islice
 from types import TracebackType
 from typing import Any, Self
 
 from planarm.campaign.engine import WAITING_BATCHES, Rows
-from planarm.campaign.task import Batch
+from planarm.campaign.task import Batch, Row
 from planarm.campaign.worker import failed_row, run_batch
-from planarm.errors import UsageError
+from planarm.errors import ClusterError, UsageError
+
+LOOK_S = 1.0
+"""Where nothing finishes, the workers are counted so often."""
 
 
 class DaskEngine:
@@ -20,12 +25,13 @@ class DaskEngine:
 
     Args:
         address: the scheduler's, like tcp://HOST:8786.
+        patience_s: how long there may be no worker, or no answer from the scheduler.
 
     Raises:
         UsageError: dask.distributed is not installed, or no scheduler answers there.
     """
 
-    def __init__(self, address: str) -> None:
+    def __init__(self, address: str, patience_s: float) -> None:
         try:
             distributed = importlib.import_module("distributed")  # an optional package
         except ImportError as error:
@@ -35,7 +41,9 @@ class DaskEngine:
         except (OSError, ValueError) as error:
             raise UsageError(f"--dask {address}: no Dask scheduler answers there ({error})") from error
         self._died = distributed.KilledWorker
-        self._as_completed = distributed.as_completed
+        self._address = address
+        self._patience_s = patience_s
+        self._alive_s = time.monotonic()
 
     def __enter__(self) -> Self:
         return self
@@ -48,34 +56,99 @@ class DaskEngine:
     def run(self, batches: Iterator[Batch]) -> Rows:
         """See `planarm.campaign.engine.Engine`.
 
-        Dask itself gives the batch of a worker that dies to another one; after some deaths it gives the batch up, which
-        is then split into single runs, and a single one that is given up is a failed row.
-        """
-        singles: deque[Batch] = deque()
-        ahead = WAITING_BATCHES * max(len(self._client.nthreads()), 1)
-        first = [self._submit(batch) for batch in islice(batches, ahead)]
-        under_way = self._as_completed(first)
-        try:
-            for future in under_way:
-                batch = future.planarm_batch
-                if future.status == "finished":
-                    yield future.result()
-                elif not isinstance(future.exception(), self._died):
-                    raise future.exception()
-                elif len(batch.tasks) > 1:
-                    singles.extend(batch.single(task) for task in batch.tasks)
-                else:
-                    reason = "its worker died each time: a crash, out of memory, or longer than limits.task_s"
-                    yield [failed_row(batch, reason)]
-                following = singles.popleft() if singles else next(batches, None)
-                if following is not None:
-                    under_way.add(self._submit(following))
-                while singles:
-                    under_way.add(self._submit(singles.popleft()))
-        finally:
-            self._client.cancel(list(under_way.futures))
+        Dask itself gives the batch of a worker that dies to another one; after some deaths it gives the batch up, and
+        with it whatever waited for the same workers. What was given up is split into single runs; single ones that are
+        given up are run alone in the end, one after the other, and one that is given up even so is a failed row.
 
-    def _submit(self, batch: Batch) -> Any:  # noqa: ANN401 - dask.distributed has no types
-        future = self._client.submit(run_batch, batch, pure=False)
-        future.planarm_batch = batch
-        return future
+        Raises:
+            ClusterError: no worker was there for `patience_s`, or the scheduler is gone; what is finished was yielded.
+        """
+        self._alive_s = time.monotonic()
+        at_once = WAITING_BATCHES * max(self._count_workers(), 1)
+        given_up: list[Batch] = []
+        yield from self._carry_out(batches, at_once, given_up)
+        suspects: list[Batch] = []
+        yield from self._carry_out(_singles(given_up), at_once, suspects)
+        for suspect in suspects:
+            guilty: list[Batch] = []
+            yield from self._carry_out(iter([suspect]), 1, guilty)
+            for batch in guilty:
+                reason = "its worker died each time: a crash, out of memory, or longer than limits.task_s"
+                yield [failed_row(batch, reason)]
+
+    def _carry_out(self, batches: Iterator[Batch], at_once: int, given_up: list[Batch]) -> Rows:
+        """Yield the rows of batches, some of which are on the cluster at once; append those that Dask gives up."""
+        done: queue.SimpleQueue[Any] = queue.SimpleQueue()
+        under_way: dict[str, tuple[Any, Batch]] = {}
+
+        def submit(following: Iterable[Batch]) -> None:
+            for batch in following:
+                future = self._client.submit(run_batch, batch, pure=False)
+                under_way[future.key] = future, batch
+                future.add_done_callback(done.put)
+
+        submit(islice(batches, at_once))
+        try:
+            while under_way:
+                key = self._next_done(done).key
+                future, batch = under_way[key]
+                rows = self._rows(future)
+                del under_way[key]
+                if rows is None:
+                    given_up.append(batch)
+                else:
+                    yield rows
+                submit(islice(batches, 1))
+        finally:
+            self._client.cancel([future for future, _ in under_way.values()])
+
+    def _next_done(self, done: queue.SimpleQueue[Any]) -> Any:  # noqa: ANN401 - dask.distributed has no types
+        """Wait for the next batch that is finished or given up, as long as there are workers."""
+        while True:
+            try:
+                return done.get(timeout=min(LOOK_S, self._patience_s))
+            except queue.Empty:
+                self._look_at_workers()
+
+    def _rows(self, future: Any) -> list[Row] | None:  # noqa: ANN401
+        """Fetch a batch's rows, None where it was given up; a worker that dies with them has them computed again."""
+        while not future.cancelled():
+            try:
+                rows: list[Row] = future.result(timeout=self._patience_s)
+            except CancelledError:
+                break
+            except TimeoutError:
+                self._look_at_workers()
+            except self._died:
+                return None
+            else:
+                self._alive_s = time.monotonic()
+                return rows
+        raise self._lost("the connection to its scheduler was lost")
+
+    def _look_at_workers(self) -> None:
+        """Go on waiting if there are workers, or were not long ago."""
+        if self._count_workers():
+            self._alive_s = time.monotonic()
+        elif time.monotonic() - self._alive_s > self._patience_s:
+            raise self._lost(f"it has had no worker for {self._patience_s:g} s (limits.cluster_s)")
+
+    def _count_workers(self) -> int:
+        try:
+            return len(self._client.nthreads(callback_timeout=self._patience_s))
+        except TimeoutError as error:
+            reason = f"its scheduler has not answered for {self._patience_s:g} s (limits.cluster_s)"
+            raise self._lost(reason) from error
+        except OSError as error:
+            raise self._lost(f"its scheduler is gone ({error})") from error
+
+    def _lost(self, reason: str) -> ClusterError:
+        return ClusterError(
+            f"--dask {self._address}: {reason}; finished runs are kept: start workers there, or another cluster, and"
+            " go on with --resume"
+        )
+
+
+def _singles(batches: list[Batch]) -> Iterator[Batch]:
+    """Yield the runs of some batches, each as a batch of its own."""
+    return (batch.single(task) for batch in batches for task in batch.tasks)

@@ -46,6 +46,7 @@ def run_campaign(
         UsageError: the folder holds other results.
         OutputError: it cannot be written.
         SceneError: the scenes or settings are wrong for every run; single wrong ones are failed rows.
+        ClusterError: the cluster is gone; everything finished is kept, and `resume` goes on from there.
     """
     store = ResultStore(folder, about(campaign), resume)
     done = store.done()

@@ -13,6 +13,9 @@ from collections.abc import Mapping
 from planarm.campaign.task import Figures, Value
 from planarm.errors import SceneError
 
+CRASH_AFTER_S = 0.5
+"""A worker that dies while it still starts takes its Dask nanny along; a real run, with its imports, dies later."""
+
 DEEDS = ("answer", "raise", "crash", "hang", "hog")
 
 
@@ -28,6 +31,7 @@ def run_self_test(settings: Mapping[str, Value]) -> tuple[str, str, Figures]:
     if deed == "raise":
         raise RuntimeError(f"run {seed} was asked to raise")
     if deed == "crash":
+        time.sleep(CRASH_AFTER_S)
         os.kill(os.getpid(), signal.SIGKILL if hasattr(signal, "SIGKILL") else signal.SIGTERM)
     if deed == "hang":
         time.sleep(3600.0)

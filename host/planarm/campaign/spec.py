@@ -14,7 +14,7 @@ from planarm.errors import SceneError
 from planarm.scene.strict_toml import Table
 
 ROOT_KEYS = ("name", "kind", "scenes", "batch", "limits", "vary", "options")
-LIMIT_KEYS = ("task_s", "memory_mb")
+LIMIT_KEYS = ("task_s", "memory_mb", "cluster_s")
 RANGE_KEYS = ("first", "count")
 KINDS = ("map", "search", "plan", "line", "faults", "self-test")
 OPTION_KEYS: Mapping[str, tuple[str, ...]] = {
@@ -39,6 +39,7 @@ class Campaign:
         axes: dotted scene keys (or "seed") and their values, the last varies fastest.
         batch: runs that travel together.
         limits: of one run.
+        cluster_s: how long a cluster may be without any worker.
         options: of the kind.
     """
 
@@ -49,6 +50,7 @@ class Campaign:
     axes: tuple[tuple[str, range | tuple[Value, ...]], ...]
     batch: int
     limits: Limits
+    cluster_s: float
     options: Mapping[str, Value]
 
     @property
@@ -106,6 +108,7 @@ def load_campaign(path: Path) -> Campaign:
             limits.number("task_s", 60.0, above=0.0, at_most=86_400.0),
             limits.integer("memory_mb", 0, at_least=0, at_most=10**7),
         ),
+        cluster_s=limits.number("cluster_s", 60.0, above=0.0, at_most=86_400.0),
         options=_options(root.table("options", OPTION_KEYS[kind], optional=True)),
     )
     if campaign.size > MOST_TASKS:

@@ -36,7 +36,7 @@ def execute(options: argparse.Namespace) -> int:
     if options.dask and options.workers:
         raise UsageError("--workers goes with this machine's own processes; a cluster has its own number")
     out = Path(options.out) if options.out else Path("out") / campaign.name
-    with DaskEngine(options.dask) if options.dask else nullcontext() as cluster:
+    with DaskEngine(options.dask, campaign.cluster_s) if options.dask else nullcontext() as cluster:
         engine = cluster or LocalEngine(options.workers or os.cpu_count() or 1)
         outcome = run_campaign(campaign, engine, out, options.resume, _teller(options.json))
     _tell(options.json, outcome, campaign.size)
