@@ -1,7 +1,8 @@
 """Draw the wirings of docs/wiring.toml: `python docs/make_wiring.py [FOLDER]`, one SVG each.
 
 The Uno is on the left with the pins that are used, in the order of its wires; the parts are on the right. A wire that
-is to be added to a shield is dashed.
+is to be added to a shield is dashed. The motor supply's line goes up the right side, through the emergency stop's
+contact.
 """
 
 import sys
@@ -11,9 +12,12 @@ from pathlib import Path
 from typing import Any
 
 DOCS = Path(__file__).resolve().parent
-WIDTH, ROW, TOP = 640, 26, 64
+WIDTH, ROW, TOP = 800, 26, 64
 UNO_X, UNO_WIDTH, PART_X, PART_WIDTH = 24, 110, 430, 186
-COLOURS = {"STEP": "#0b6fb8", "DIR": "#b8620b", "ENABLE": "#5b6770"}
+COLOURS = {"STEP": "#0b6fb8", "DIR": "#b8620b", "ENABLE": "#5b6770", "GND": "#222"}
+SUPPLY = "#b3202c"
+SUPPLY_FROM = "motor supply +"
+RAIL_X = PART_X + PART_WIDTH + 26
 OTHER = "#3d8a4e"
 STYLE = "font-family: sans-serif; font-size: 14px"
 
@@ -46,6 +50,7 @@ def draw(wiring: dict[str, Any]) -> str:
     boxes.append(_box(UNO_X, TOP, UNO_WIDTH, y - 18 - TOP, "Uno"))
     boxes += [_text(UNO_X + UNO_WIDTH - 14, at + 5, pin, "end") for pin, at in pin_at.items()]
     lines = [_wire(pin_at[wire["from"]], places[wire["to"]], wire) for wire in wires]
+    lines += _supply(places[SUPPLY_FROM], [places[place] for place in wiring["supplied"]])
     height = y + 8
     head = f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {WIDTH} {height}" width="{WIDTH}" height="{height}"'
     title = f'<text x="{UNO_X}" y="36" font-size="18" font-weight="bold">{escape(wiring["title"])}</text>'
@@ -69,6 +74,17 @@ def _wire(from_y: float, to_y: float, wire: dict[str, Any]) -> str:
     middle = (begin + end) / 2
     path = f"M {begin} {from_y:g} C {middle:g} {from_y:g} {middle:g} {to_y:g} {end} {to_y:g}"
     return f'<path d="{path}" fill="none" stroke="{colour}" stroke-width="2.5"{dashes}/>'
+
+
+def _supply(from_y: float, to_ys: list[float]) -> list[str]:
+    """The line from the supply to each place, and an opened contact just above the supply."""
+    edge, contact = PART_X + PART_WIDTH, from_y - 12
+    stroke = f'fill="none" stroke="{SUPPLY}" stroke-width="2.5"'
+    lines = [f'<path d="M {edge} {from_y:g} H {RAIL_X} V {contact:g}" {stroke}/>']
+    lines.append(f'<path d="M {RAIL_X} {contact:g} l 12 -20" {stroke}/>')
+    lines.append(f'<path d="M {RAIL_X} {contact - 22:g} V {min(to_ys):g}" {stroke}/>')
+    lines += [f'<path d="M {RAIL_X} {y:g} H {edge}" {stroke}/>' for y in to_ys]
+    return [*lines, _text(RAIL_X + 20, contact - 14, "emergency"), _text(RAIL_X + 20, contact + 4, "stop's contact")]
 
 
 if __name__ == "__main__":

@@ -49,6 +49,15 @@ def test_every_wiring_brings_the_firmwares_pins_to_the_drivers(name, board, slot
     assert inputs[: 1 + wired.joints] == [wired.stop_pin, *wired.limit_pins]
 
 
+@pytest.mark.parametrize("name", WIRINGS)
+def test_all_drivers_are_supplied_through_the_emergency_contact(name):
+    places = [f"{part['name']} {pin}" for part in WIRINGS[name]["parts"] for pin in part["pins"]]
+    assert WIRINGS[name]["supplied"] == [place for place in places if place.endswith("motor +")] != []
+    assert all(
+        f"{place.removesuffix('motor +')}GND" in places for place in places if place.startswith("driver 1 motor")
+    )
+
+
 def test_on_the_shield_exactly_the_wires_that_it_does_not_have_are_added():
     shield = WIRINGS["cnc_shield_wires"]
     for wire in shield["wires"]:
