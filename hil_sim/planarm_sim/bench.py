@@ -310,8 +310,9 @@ class Bench:
 
     def _follow_switches(self) -> None:
         """Carry the switches' changes to the board; the contact chatters for a while after each."""
-        changes = self.plant.switch_changes() if self.plant.rig.switches else ()
-        for change in changes[self._switches_seen :]:
+        changes = self.plant.switch_changes(self._switches_seen) if self.plant.rig.switches else ()
+        self._switches_seen += len(changes)
+        for change in changes:
             if change.switch in self._forced:
                 continue
             bounces = int(self.plant.rig.switches[change.switch].bounce_s * CLOCK_HZ / BOUNCE_CYCLES)
@@ -319,7 +320,6 @@ class Bench:
             for n in range(1, 2 * (bounces // 2) + 1):
                 level = change.pressed if n % 2 == 0 else not change.pressed
                 self.at(self.uno.cycle + n * BOUNCE_CYCLES, partial(self._drive_unless_forced, change.switch, level))
-        self._switches_seen = len(changes)
 
     def _chatter(self, switch: int, closed: bool) -> None:
         """Open and close a bouncing switch until it works again."""

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from planarm_sim.errors import UsageError
-from planarm_sim.plant import Joint, Link, Motor, Plant, Rig
+from planarm_sim.plant import Joint, LimitSwitch, Link, Motor, Plant, Rig, SwitchChange
 from planarm_sim.plant.build import fastest_per_s
 from planarm_sim.plant.rigid_body import inertia_constants
 from two_link_reference import swing
@@ -140,6 +140,28 @@ def test_two_runs_are_the_same_and_a_snapshot_goes_back():
     np.testing.assert_array_equal(first.q_rad, second.q_rad)
     first.run_to(2 * S)
     np.testing.assert_array_equal(first.q_rad, after)
+
+
+def test_switches_changes_are_told_once_and_a_snapshot_goes_back_behind_them():
+    """A free link turns at 0.1 rad/s into its switch and, sent back, out of it."""
+    switch = LimitSwitch(0, "D9", 0.1, above=True)
+    plant = Plant(Rig(ARM[:1], (Joint(),), (), (0.0,), gravity_m_s2=0.0, switches=(switch,)), step_cycles=800)
+    plant.set_motion((0.0,), (0.1,))
+    plant.run_to(S // 2)
+    kept = plant.snapshot()
+    assert plant.switch_changes() == ()
+    plant.run_to(3 * S // 2)
+    (pressed,) = plant.switch_changes()
+    assert pressed.pressed and abs(pressed.cycle - S) <= 800
+    plant.set_motion(tuple(plant.q_rad), (-0.1,))
+    plant.run_to(5 * S // 2)
+    both = plant.switch_changes()
+    assert both == (pressed, SwitchChange(both[1].cycle, 0, False)) and abs(both[1].cycle - 2 * S) <= 800
+    assert plant.switch_changes(after=1) == both[1:] and plant.switch_changes(after=2) == ()
+    plant.restore(kept)
+    assert plant.switch_changes() == ()
+    plant.run_to(3 * S // 2)
+    assert plant.switch_changes() == (pressed,)
 
 
 LIGHT = (Link.rod(0.104, 0.0085), Link.rod(0.268, 0.0108))

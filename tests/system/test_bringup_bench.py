@@ -93,7 +93,7 @@ def test_an_arm_of_other_lengths_and_zeros_is_calibrated_within_what_touching_al
     assert max(found.before_mm) > 8.0 and found.rms_mm < 0.3
 
 
-ARMS = {1: (20.0,), 3: (18.0, 14.0, 9.0), 4: (18.0, 14.0, 9.0, 6.0)}
+ARMS = {1: (20.0,), 3: (18.0, 14.0, 9.0), 4: (18.0, 14.0, 11.0, 8.0)}
 AT = (radians(60.0), radians(-70.0), radians(-30.0), radians(40.0))
 
 

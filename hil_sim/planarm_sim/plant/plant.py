@@ -67,6 +67,7 @@ class Plant:
         size = len(self._state.y)
         self._work = layout.Work(np.zeros((4, size)), np.zeros(size), *(np.zeros(s) for s in ((n, n), n, n, (n, n), n)))
         self._marks: list[Floats] = []
+        self._switched: list[SwitchChange] = []
         self._log = [np.concatenate([[cycle], self._state.y])[None]]
         self._waiting = NO_EVENTS
         self._at_rest = False
@@ -239,6 +240,7 @@ class Plant:
             self._log.append(log[:logged].copy())
         if marked:
             self._marks.append(marks[:marked].copy())
+            self._switched += _switch_changes(marks[:marked])
 
     def motion(self) -> NDArray[Any]:
         """Samples of the motion so far.
@@ -271,10 +273,9 @@ class Plant:
         """Every time that a joint ran into a hard stop."""
         return tuple(StopHit(int(c), int(i), q) for c, _, i, _, q in self._marked(layout.STOPPED))
 
-    def switch_changes(self) -> tuple[SwitchChange, ...]:
-        """Every change of a limit switch, without its bouncing."""
-        rows = self._marked(layout.SWITCHED)
-        return tuple(SwitchChange(int(c), int(k), bool(pressed)) for c, _, k, pressed, _ in rows)
+    def switch_changes(self, after: int = 0) -> tuple[SwitchChange, ...]:
+        """Every change of a limit switch, without its bouncing, but the first `after` of them."""
+        return tuple(self._switched[after:])
 
     @property
     def pressed(self) -> tuple[bool, ...]:
@@ -299,11 +300,20 @@ class Plant:
         for array, saved in zip((*self._state, self._switches.pressed), arrays, strict=True):
             array[...] = saved
         self._log, self._marks = list(log), list(marks)
+        self._switched = [change for rows in marks for change in _switch_changes(rows)]
 
     def _marked(self, kind: int) -> list[list[float]]:
-        rows = np.concatenate([np.empty((0, layout.MARK_COLUMNS)), *self._marks])
-        return [list(row) for row in rows[rows[:, 1] == kind].tolist()]
+        return _of_kind(np.concatenate([np.empty((0, layout.MARK_COLUMNS)), *self._marks]), kind)
 
     def _rotors_at(self, q_rad: Floats) -> Floats:
         turned: Floats = self._drive.coupling @ (q_rad - self._drive.zero) / self._drive.gear
         return turned
+
+
+def _of_kind(marks: Floats, kind: int) -> list[list[float]]:
+    return [list(row) for row in marks[marks[:, 1] == kind].tolist()]
+
+
+def _switch_changes(marks: Floats) -> list[SwitchChange]:
+    rows = _of_kind(marks, layout.SWITCHED)
+    return [SwitchChange(int(c), int(k), bool(pressed)) for c, _, k, pressed, _ in rows]
