@@ -36,11 +36,12 @@ Check checked;
 static_assert(static_cast<uint64_t>(wire::QUEUE_BYTES / 6) * ENOUGH_TICKS + wire::MAX_SEGMENT_TICKS <
                   0xFFFFFFFF,
               "32 bits hold what is queued, and the segment in progress");
-uint32_t counted(uint32_t ticks) { return ticks < ENOUGH_TICKS ? ticks : ENOUGH_TICKS; }
+uint32_t counted(uint32_t ticks) { return least_of(ticks, ENOUGH_TICKS); }
 
 [[gnu::noinline]] bool is_out_of_limits(uint8_t joint, int32_t usteps) {
-    const int32_t least_usteps = settings::soft_limits.least_usteps[joint];
-    const int32_t most_usteps = settings::soft_limits.most_usteps[joint];
+    const wire::SoftLimits& limits = hal::by_base(settings::soft_limits);
+    const int32_t least_usteps = limits.least_usteps[joint];
+    const int32_t most_usteps = limits.most_usteps[joint];
     return least_usteps <= most_usteps && (usteps < least_usteps || usteps > most_usteps);
 }
 

@@ -87,15 +87,12 @@ class Motion {
     bool begun;  // the first slice
     bool frozen;
     bool starved;  // frozen because the queue ran low
-    uint32_t frozen_ticks;
-    uint32_t begin_ticks;  // start of the motion
 
     Wish wish;
     uint8_t percent;
     uint32_t override_stretch;
 
     bool reading;  // a payload
-    path_clock::Rates rates;
     uint8_t need;  // in NEED_UNIT_TICKS
 
     bool segment_last;
@@ -106,7 +103,9 @@ class Motion {
     bool urgent;   // the last call of serve handed something over
     uint8_t turn;  // the joint whose run was handed over last
     uint8_t prepared_count;
+    uint32_t frozen_ticks;
     uint32_t executed_segments;
+    uint32_t begin_ticks;  // start of the motion
 };
 
 Motion motion;
@@ -118,7 +117,7 @@ Motion& current() { return hal::by_base(motion); }
 bool Motion::is_starving(uint8_t margin) const {
     if (intake::is_complete() || segment_last || queue::free_bytes() < FULL_BYTES) return false;
     const uint32_t road_ticks = intake::path_ticks() + left_ticks;
-    return road_ticks / wire::NEED_UNIT_TICKS < static_cast<uint16_t>(need + margin);
+    return multiply_high(road_ticks, 2) < static_cast<uint32_t>(need) + margin;
 }
 
 // Apart from serve, whose frame on the stack lies below the deepest calls.
@@ -126,8 +125,8 @@ bool Motion::is_starving(uint8_t margin) const {
     if (!reading) {
         if (queue::is_empty()) return;
         queue::read_front(payload);
-        rates.slow = payload.u8();
-        rates.fast = payload.u8();
+        slice.way().rates.slow = payload.u8();
+        slice.way().rates.fast = payload.u8();
         need = payload.u8();
         reading = true;
     }
@@ -150,30 +149,28 @@ bool Motion::is_starving(uint8_t margin) const {
 }
 
 [[gnu::noinline]] void Motion::open_slice() {
-    path_clock::Way way;
-    way.ends_segment = left_ticks <= slice_ticks;
-    way.path_ticks = slice_ticks;
-    if (way.ends_segment) way.path_ticks = static_cast<uint16_t>(left_ticks);
+    path_clock::Way& way = slice.way();
+    way.path_ticks = static_cast<uint16_t>(least_of(left_ticks, slice_ticks));
+    way.ends_segment = left_ticks == way.path_ticks;
     left_ticks -= way.path_ticks;
-    const bool quickly = wish == Wish::REST_QUICKLY || is_starving(STARVING_MARGIN);
-    way.target = quickly || wish == Wish::REST ? path_clock::MAX_STRETCH : override_stretch;
-    way.rates = rates;
-    way.gently = !quickly;
-    slice.follow(way);
+    way.target = override_stretch;
+    way.gently = !(wish == Wish::REST_QUICKLY || is_starving(STARVING_MARGIN));
+    if (!way.gently || wish == Wish::REST) way.target = path_clock::MAX_STRETCH;
+    slice.follow();
     Prepared& entry = hal::by_base(prepared[prepared_count++]);
     entry.end_ticks = slice.end_ticks();
     entry.ends_segment = way.ends_segment;
-    entry.ends_motion = way.ends_segment && segment_last;
+    entry.ends_motion = segment_last & way.ends_segment;
     entry.calm = true;
-    for (uint8_t joint = 0; joint < wire::JOINTS; ++joint) {
-        entry.calm = entry.calm && cursors[joint].is_calm(slice, settings::config.start_stop_ticks[joint]);
+    for (uint8_t joint = 0; joint < wire::JOINTS && entry.calm; ++joint) {
+        entry.calm = cursors[joint].is_calm(slice, settings::config.start_stop_ticks[joint]);
     }
     filling = true;
 }
 
 // Hands runs over, one of each joint; while the clock is stretched, when one takes long, of one joint in its
 // turn. True when nothing of the slice is left.
-bool Motion::fill_slice() {
+[[gnu::noinline]] bool Motion::fill_slice() {
     bool more = false;
     uint8_t joint = turn;
     for (uint8_t i = 0; i < wire::JOINTS; ++i) {
@@ -213,7 +210,7 @@ Progress Motion::retire() {
         if (prepared[0].ends_segment) ++executed_segments;
         const bool ends_motion = prepared[0].ends_motion;
         --prepared_count;
-        for (uint8_t i = 0; i < prepared_count; ++i) prepared[i] = prepared[i + 1];
+        for (uint8_t i = 0; i < MAX_SLICES - 1; ++i) prepared[i] = prepared[i + 1];
         if (prepared_count == 0 && !is_in_segment() && queue::is_empty()) {
             clear();
             return ends_motion ? Progress::DONE : Progress::UNDERRUN;
@@ -330,8 +327,7 @@ uint32_t Motion::tell_ledger(wire::Ledger& ledger) const {
         if (prepared[i].ends_segment) ++segments;
     }
     ledger.executed_segments = segments;
-    for (uint8_t joint = 0; joint < wire::JOINTS; ++joint)
-        ledger.position_usteps[joint] = position.usteps[joint];
+    __builtin_memcpy(ledger.position_usteps, position.usteps, sizeof(position.usteps));
     return clock::device_ticks(ticks);
 }
 

@@ -9,7 +9,7 @@ namespace {
 // most `most`: rate x path x stretch^2, in 2^-16.
 uint32_t relative_change(uint32_t rate_path, uint32_t stretch, uint8_t most) {
     const uint32_t relative = multiply_q32(rate_path, multiply_q16(stretch, stretch));
-    return relative >> 16 < most ? relative : most * ONE;
+    return least_of(relative, most * ONE);
 }
 
 // At most twice the stretch, so that a quadratic in the number of steps stays a good likeness.
@@ -37,10 +37,11 @@ uint32_t sped_up(uint32_t stretch, uint32_t rate_path) {
 
 uint32_t rate_value(uint8_t code) {
     const uint8_t mantissa = static_cast<uint8_t>(code & 0x0F);
-    const uint8_t exponent = static_cast<uint8_t>(code >> 4);
-    if (exponent == 0) return mantissa;
-    uint32_t value = 16u + mantissa;
-    for (uint8_t i = 1; i < exponent; ++i) value <<= 1;
+    uint8_t exponent = static_cast<uint8_t>(code >> 4);
+    uint32_t value = mantissa;
+    if (exponent == 0) return value;
+    value += 16;
+    while (--exponent != 0) value <<= 1;
     return value;
 }
 
@@ -54,33 +55,38 @@ uint32_t stretch_after(uint32_t stretch, const Way& way) {
     return most_of(sped_up(stretch, rate_path), target);
 }
 
-void Slice::follow(const Way& way) {
-    path_ticks_ = way.path_ticks;
+void Slice::follow() {
     start_ticks_ = end_ticks_;
-    ends_segment_ = way.ends_segment;
     s0_ = s1_;
-    if (s1_ != way.target) s1_ = stretch_after(s1_, way);
+    if (s1_ != way_.target) s1_ = stretch_after(s1_, way_);
     plain_ = (s0_ | s1_) == ONE;  // neither is less
-    increase(end_ticks_, multiply_high((s0_ + s1_) >> 1, way.path_ticks));
-    if (s0_ != s1_) reciprocal_ = 0xFFFFFFFF / way.path_ticks;
+    increase(end_ticks_, multiply_high((s0_ + s1_) >> 1, way_.path_ticks));
+    if (s0_ != s1_) reciprocal_ = 0xFFFFFFFF / way_.path_ticks;
 }
 
-// The shares add up to a little less than 1. Below a stretch of 1 steps would come closer than the least
-// interval, whose ticks the step interrupt needs all.
+// From the lesser end up, whichever that is: never below a stretch of 1, where steps would come closer than
+// the least interval, whose ticks the step interrupt needs all.
 uint32_t Slice::stretch_at(uint16_t path) const {
     if (s0_ == s1_) return s0_;
-    const uint16_t share = static_cast<uint16_t>(multiply_high(reciprocal_, path));  // of the slice, in 2^-16
-    return most_of(multiply_high(s0_, static_cast<uint16_t>(~share)) + multiply_high(s1_, share), ONE);
+    uint16_t share = static_cast<uint16_t>(multiply_high(reciprocal_, path));  // of the slice, in 2^-16
+    uint32_t range = s1_ - s0_;
+    uint32_t least = s0_;
+    if (s1_ < least) {
+        least = s1_;
+        range = 0 - range;
+        share = static_cast<uint16_t>(~share);
+    }
+    return multiply_high(range, share) + least;
 }
 
 uint32_t Slice::ticks_at(uint16_t path) const {
-    if (plain_) return start_ticks_ + path;
-    return start_ticks_ + multiply_high((s0_ + stretch_at(path)) >> 1, path);
+    uint32_t ticks = path;
+    if (!plain_) ticks = multiply_high((stretch_at(path) + s0_) >> 1, path);
+    return ticks + start_ticks_;
 }
 
 uint16_t Slice::stretched(uint16_t ticks, uint16_t path) const {
-    const uint32_t longer = multiply_high(stretch_at(path), ticks);
-    return longer < 0xFFFF ? static_cast<uint16_t>(longer) : 0xFFFF;
+    return static_cast<uint16_t>(least_of(multiply_high(stretch_at(path), ticks), 0xFFFF));
 }
 
 }  // namespace path_clock

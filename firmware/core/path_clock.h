@@ -47,11 +47,13 @@ class Slice {
     void begin_at(uint32_t ticks) { end_ticks_ = ticks; }
     void begin_with(uint32_t stretch) { s1_ = stretch; }
 
-    void follow(const Way& way);
+    // The next slice: what is asked of it, to be written before, and to go on from there.
+    Way& way() { return way_; }
+    void follow();
 
     bool is_plain() const { return plain_; }  // at a stretch of 1
-    bool ends_segment() const { return ends_segment_; }
-    uint16_t path_ticks() const { return path_ticks_; }
+    bool ends_segment() const { return way_.ends_segment; }
+    uint16_t path_ticks() const { return way_.path_ticks; }
     uint32_t end_ticks() const { return end_ticks_; }
     uint32_t end_stretch() const { return s1_; }
     uint32_t least_stretch() const { return least_of(s0_, s1_); }
@@ -69,9 +71,8 @@ class Slice {
     uint32_t s0_;
     uint32_t s1_;
     uint32_t reciprocal_;  // 2^32 / path ticks
-    uint16_t path_ticks_;
+    Way way_;
     bool plain_;
-    bool ends_segment_;
 };
 
 }  // namespace path_clock

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib.util
 import itertools
 import re
 import shutil
@@ -15,6 +16,11 @@ FIRMWARE = Path(__file__).parents[2] / "firmware"
 
 needs_avr_gcc = pytest.mark.skipif(
     shutil.which("avr-gcc") is None, reason="avr-gcc is not installed (Debian: gcc-avr, avr-libc): no image is built"
+)
+
+needs_pio = pytest.mark.skipif(
+    importlib.util.find_spec("platformio") is None or importlib.util.find_spec("SCons") is None,
+    reason="platformio and scons are not installed: PlatformIO's build is not tried",
 )
 
 
@@ -44,6 +50,23 @@ def test_the_order_is_worth_having(orderer: ModuleType, uno_image: Path, tmp_pat
     graph = orderer.read_graph(elf)
     assert graph.far_jumps <= 40 and len(graph.jumps) > 400, "run firmware/order.py"
     assert code_bytes(tmp_path / "plain.elf") - code_bytes(elf) >= 400, "run firmware/order.py"
+
+
+@needs_avr_gcc
+@needs_pio
+def test_platformio_links_again_when_the_order_changed(
+    builder: ModuleType, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    copy = tmp_path / "firmware"
+    shutil.copytree(FIRMWARE, copy, ignore=shutil.ignore_patterns("build", ".pio", "__pycache__"))
+    monkeypatch.setattr(builder, "FIRMWARE", copy)
+    image = tmp_path / "pio" / "build" / "uno" / "program.hex"
+    assert "Linking" in builder.run_pio(tmp_path, "run", "-e", "uno")
+    ordered = image.read_bytes()
+    assert "Linking" not in builder.run_pio(tmp_path, "run", "-e", "uno")
+    (copy / "order.ld").write_text("", encoding="utf-8")
+    assert "Linking" in builder.run_pio(tmp_path, "run", "-e", "uno")
+    assert image.read_bytes() != ordered
 
 
 @needs_avr_gcc
