@@ -53,9 +53,9 @@ def test_every_wiring_brings_the_firmwares_pins_to_the_drivers(name, board, slot
 def test_all_drivers_are_supplied_through_the_emergency_contact(name):
     places = [f"{part['name']} {pin}" for part in WIRINGS[name]["parts"] for pin in part["pins"]]
     assert WIRINGS[name]["supplied"] == [place for place in places if place.endswith("motor +")] != []
-    assert all(
-        f"{place.removesuffix('motor +')}GND" in places for place in places if place.startswith("driver 1 motor")
-    )
+    grounded = [wire["to"] for wire in WIRINGS[name]["wires"] if wire["from"] == "GND"]
+    own = [place for place in WIRINGS[name]["supplied"] if place.startswith("driver")]
+    assert [place.replace("motor +", "GND") for place in own] == [place for place in grounded if place[0] == "d"]
 
 
 def test_on_the_shield_exactly_the_wires_that_it_does_not_have_are_added():
