@@ -45,6 +45,28 @@ ANSWER_TICKS = 120_000  # the longest frame, what it asks for, and the answer, o
 REST = Move(0, 0, 0, 0)
 UNO = BOARDS["uno"]
 
+SUPERVISOR_EVENTS = [
+    "enable",
+    "release",
+    "segments",
+    "start",
+    "clear",
+    "hold",
+    "resume",
+    "stop",
+    "quick_stop",
+    "config",
+    "soft_limits",
+    "home",
+    "set_position",
+    "at_rest",
+    "starved",
+    "fed",
+    "done",
+    "clear_kept",
+]
+"""In the order of supervisor::Event."""
+
 
 @dataclass(frozen=True)
 class Delays:

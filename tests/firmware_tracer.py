@@ -8,7 +8,7 @@ from pathlib import Path
 from firmware_board import UNO, EmulatedFirmware
 from planarm_wire.boards import Board as Wiring
 
-SCHEDULED, STEP_1, STEP_2, LAP, RECEIVE, TRANSMIT = 7, 11, 12, 13, 18, 19  # numbers of the vectors, from 0
+PIN_CHANGE, SCHEDULED, STEP_1, STEP_2, LAP, RECEIVE, TRANSMIT = 4, 7, 11, 12, 13, 18, 19  # of the vectors, from 0
 ENTRY_CYCLES = 4
 INTERRUPTS_ON = 0x80
 CLI, WDR = b"\xf8\x94", b"\xa8\x95"
@@ -64,7 +64,7 @@ class Tracer(EmulatedFirmware):
         chip.run_to(at + 1)
         if was_locked or cli:
             self.locked.update(range(at, chip.cycle))
-        if chip.pc % 2 or not SCHEDULED <= chip.pc // 2 <= TRANSMIT:
+        if chip.pc % 2 or not PIN_CHANGE <= chip.pc // 2 <= TRANSMIT:
             return
         vector, begun = chip.pc // 2, chip.cycle - ENTRY_CYCLES
         assert chip.sp == depth - 2

@@ -23,7 +23,7 @@ constexpr uint8_t ESCAPE = 0x7D;
 constexpr uint8_t ESCAPE_XOR = 0x20;
 // Never inside a frame; receivers drop them.
 constexpr uint8_t RESERVED[2] = {0x7B, 0x7C};
-// Out of band: slows down along the path and rests there; RESUME goes on.
+// Out of band: slows down along the path and rests there; RESUME goes on. Ends a homing.
 constexpr uint8_t HOLD_CODE = 0x7B;
 // In a row.
 constexpr uint8_t HOLD_REPEATS = 1;

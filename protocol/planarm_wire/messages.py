@@ -25,7 +25,7 @@ ESCAPE_XOR: Final = 0x20
 RESERVED: Final = (0x7B, 0x7C)
 """Never inside a frame; receivers drop them."""
 HOLD_CODE: Final = 0x7B
-"""Out of band, 1 in a row: slows down along the path and rests there; RESUME goes on."""
+"""Out of band, 1 in a row: slows down along the path and rests there; RESUME goes on. Ends a homing."""
 HOLD_REPEATS: Final = 1
 """How often in a row the code must come."""
 EMERGENCY_CODE: Final = 0x7C

@@ -63,6 +63,7 @@ MOST_OFF_TICKS = {
     "cnc_shield": (160, 160),
     "cnc_shield_four": (480, 480, 192, 192),
 }
+WATCH_STOP_INPUT, WATCH_SWITCHES = 4, 8  # bits of CONFIG's options
 LOOK_CYCLES, ONE_STEP_CYCLES, BOTH_CYCLES = (62, 76), (127, 210), (278, 288)
 
 
@@ -237,21 +238,46 @@ def test_a_hold_rests_on_the_path_and_loses_nothing(name: str) -> None:
     assert status.ledger.position_usteps == tuple(board.position_at(joint, board.now) for joint in range(joints))
 
 
+@pytest.mark.parametrize("by_input", [False, True], ids=["line", "stop input"])
 @pytest.mark.parametrize("name", OTHERS)
-def test_an_emergency_stop_ends_all_pulses(name: str) -> None:
-    motion = steady(name, 2000, 0.3)
+def test_an_emergency_stop_ends_all_pulses_and_cuts_none(name: str, by_input: bool) -> None:
+    # At moments all over an interval, so that some are in the first ticks of each joint's pulse.
+    interval, wiring = 2000, BOARDS[name]
     board = Board(emulated(name))
-    board.get_ready()
-    for segment in motion[:6]:
+    uno = board._firmware.uno
+    uno.pin(wiring.stop_pin).drive(0)
+    board.hello()
+    options = WATCH_STOP_INPUT if by_input else 0
+    joints = wiring.joints
+    board.ask(Config(PinMap[wiring.pin_map.upper()], joints, 0, options, 0, 0, 0, (20_000,) * joints))
+    board.ask(Enable(1))
+    board.run(WAKE_TICKS)
+    for segment in steady(name, interval, 0.3)[:6]:
         board.ask(Segments(0, 0, 0, (segment,)))
     board.ask(Start(LEAD_TICKS))
-    board.run(400_000)
-    board.receive(bytes([EMERGENCY_CODE] * 3))
-    stop_bit = board.now + 3 * 640
-    board.run(200_000)
-    assert max(edge.tick for edge in board.motion_edges()) <= stop_bit + 480, "30 us"
-    assert not any(board._firmware.uno.pin(pin).level for pin in BOARDS[name].step_pins)
-    assert board.ask().fault is Fault.EMERGENCY_STOP
+    board.run(300_000)
+    while any(uno.pin(pin).level for pin in wiring.step_pins):  # from here on every pulse has both edges
+        board.run(1)
+    moving, seq = uno.snapshot(), board.seq
+    for phase in range(0, interval, 11):
+        uno.restore(moving)
+        board.edges.clear()
+        board.forget_replies()
+        board.seq = seq
+        board.run(phase)
+        if by_input:
+            uno.pin(wiring.stop_pin).drive(1)
+            stopped = board.now
+        else:
+            board.receive(bytes([EMERGENCY_CODE] * 3))
+            stopped = board.now + 3 * 640
+        board.run(20_000)
+        for pin in wiring.step_pins:
+            ticks = [edge.tick for edge in board.edges if edge.pin == pin]
+            assert not ticks or ticks[-1] <= stopped + 480, "30 us"
+            highs = [fall - rise for rise, fall in zip(ticks[::2], ticks[1::2], strict=True)]
+            assert all(high >= wiring.min_step_high_ticks for high in highs), (pin, phase)
+    assert board.ask().fault is (Fault.STOP_INPUT if by_input else Fault.EMERGENCY_STOP)
 
 
 @pytest.mark.parametrize("name", OTHERS)
@@ -311,9 +337,6 @@ def test_cycles_of_the_scheduled_interrupt() -> None:
     groups = [[c for c in taken if low <= c <= high] for low, high in (LOOK_CYCLES, ONE_STEP_CYCLES, BOTH_CYCLES)]
     assert all(groups)
     assert sum(map(len, groups)) == len(taken), taken
-
-
-WATCH_SWITCHES = 8  # a bit of CONFIG's options
 
 
 def switched_on(name: str) -> Board:

@@ -12,18 +12,23 @@ from pathlib import Path
 
 import pytest
 
-from firmware_board import LEAD_TICKS, Board, Schedule, end_motion, run_of, segment_of
-from firmware_tracer import INTERRUPTS_ON, LAP, RECEIVE, STEP_1, STEP_2, TRANSMIT, Tracer
+from firmware_board import LEAD_TICKS, UNO, Board, Schedule, end_motion, run_of, segment_of
+from firmware_tracer import INTERRUPTS_ON, LAP, PIN_CHANGE, RECEIVE, STEP_1, STEP_2, TRANSMIT, Tracer
 from planarm_wire.codec import encode
 from planarm_wire.framing import encode_frame
 from planarm_wire.messages import (
     DELIMITER,
+    EMERGENCY_CODE,
     ESCAPE,
+    HOLD_CODE,
+    JOINTS,
     PROTOCOL_VERSION,
     RESERVED,
     STEP_PINS,
+    Config,
     Fault,
     Hello,
+    PinMap,
     Query,
     Segment,
     Segments,
@@ -38,8 +43,13 @@ MISSED_CYCLES = 82
 HIGH_CYCLES = range(56, 60)  # nothing else runs but an instruction of the main program
 LOCK_CYCLES = 11  # of the main program; firmware/README.md, budgets
 RECEIVE_CYCLES, OVERRUN_CYCLES, FULL_CYCLES = 40, 44, 40
+HOLD_CYCLES, EMERGENCY_CYCLES = 32, 32
+MOST_RECEIVE_CYCLES = 45
+LAST_EMERGENCY_CYCLES = 108  # no step comes after it
+CLOSED_CYCLES, OPENED_CYCLES = 12, 94  # the stop input's contact
 TRANSMIT_CYCLES, ESCAPE_CYCLES, DELIMITER_CYCLES = 34, 39, 35
 LAP_CYCLES = 18
+WATCH_STOP_INPUT = 4  # a bit of CONFIG's options
 
 
 @pytest.fixture
@@ -124,6 +134,32 @@ def test_receive_interrupt(tracer: Tracer) -> None:
     tracer.hold_interrupts(5 * 640)
     board.run(2000)
     assert tracer.taken(RECEIVE) == {RECEIVE_CYCLES, OVERRUN_CYCLES}
+
+
+def test_receive_interrupt_out_of_band(tracer: Tracer) -> None:
+    # The third byte in a row ends all steps, as does each behind it, and another byte begins anew.
+    board = play(tracer, end_motion([segment_of(200_000, run_of(2))]))
+    tracer.done.clear()
+    board.receive(bytes([HOLD_CODE, *[EMERGENCY_CODE] * 4, HOLD_CODE, EMERGENCY_CODE]))
+    board.run(7 * 640 + 400)
+    last = [LAST_EMERGENCY_CYCLES] * 2
+    told = [HOLD_CYCLES, *[EMERGENCY_CYCLES] * 2, *last, HOLD_CYCLES, EMERGENCY_CYCLES]
+    assert [cycles for number, cycles in tracer.done if number == RECEIVE] == told
+    assert max(RECEIVE_CYCLES, OVERRUN_CYCLES, FULL_CYCLES, HOLD_CYCLES, EMERGENCY_CYCLES) <= MOST_RECEIVE_CYCLES
+
+
+def test_the_stop_inputs_interrupt(tracer: Tracer) -> None:
+    board = Board(tracer)
+    stop = tracer.uno.pin(UNO.stop_pin)
+    stop.drive(0)
+    tracer.run(2000)
+    board.hello()
+    board.ask(Config(PinMap.OWN, JOINTS, 0, WATCH_STOP_INPUT, 0, 0, 0, (4000,) * JOINTS))
+    tracer.done.clear()
+    for level in (1, 0):
+        stop.drive(level)
+        tracer.run(500)
+    assert [cycles for number, cycles in tracer.done if number == PIN_CHANGE] == [OPENED_CYCLES, CLOSED_CYCLES]
 
 
 def test_transmit_interrupt(tracer: Tracer) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import pytest
@@ -26,6 +27,7 @@ from planarm_wire.messages import (
     ENABLE_PIN,
     HOLD_CODE,
     JOINTS,
+    MIN_STEP_HIGH_TICKS,
     STEP_PINS,
     Clear,
     Config,
@@ -71,21 +73,45 @@ def moving(board: Board) -> None:
     assert board.rises(0)
 
 
-@pytest.mark.parametrize("phase", range(0, 320, 40))
-def test_three_emergency_bytes_end_all_edges_within_30_us(emulated_firmware: EmulatedFirmware, phase: int) -> None:
-    board = configured(emulated_firmware)
+ALL_PHASES = range(0, 4160, 7)  # every tick of either joint's interval in moving(); after 4,160 both repeat
+
+
+def assert_ends_in_every_phase(firmware: EmulatedFirmware, board: Board, stop: Callable[[], int]) -> None:
+    """While both joints move `stop` ends all edges within 30 us of the tick that it returns, and cuts no pulse."""
     moving(board)
-    board.run(phase)
-    board.receive(bytes([EMERGENCY_CODE] * EMERGENCY_REPEATS))
-    on_line = board.now
-    board.run(100_000)
-    # The bytes follow each other without a gap from here on; the last stop bit ends three bytes later.
-    stopped = on_line + EMERGENCY_REPEATS * BYTE_TICKS
-    last = max(edge.tick for edge in board.edges if edge.pin in STEP_PINS)
-    assert stopped - 3 * BYTE_TICKS < last <= stopped + MOST_TICKS_AFTER_STOP
+    uno, seq = firmware.uno, board.seq
+    while any(uno.pin(pin).level for pin in STEP_PINS):  # from here on every pulse has both edges
+        board.run(1)
+    begun = uno.snapshot()
+    for phase in ALL_PHASES:
+        uno.restore(begun)
+        board.edges.clear()
+        board.forget_replies()
+        board.seq = seq
+        board.run(phase)
+        stopped = stop()
+        board.run(20_000)
+        for pin in STEP_PINS:
+            ticks = [edge.tick for edge in board.edges if edge.pin == pin]
+            assert not ticks or ticks[-1] <= stopped + MOST_TICKS_AFTER_STOP, phase
+            highs = [fall - rise for rise, fall in zip(ticks[::2], ticks[1::2], strict=True)]
+            assert all(high >= MIN_STEP_HIGH_TICKS for high in highs), phase
+
+
+def test_three_emergency_bytes_end_all_edges_within_30_us_and_cut_no_pulse(
+    emulated_firmware: EmulatedFirmware,
+) -> None:
+    board = configured(emulated_firmware)
+
+    def stop() -> int:
+        # The bytes follow each other without a gap from here on; the last stop bit ends three bytes later.
+        board.receive(bytes([EMERGENCY_CODE] * EMERGENCY_REPEATS))
+        return board.now + EMERGENCY_REPEATS * BYTE_TICKS
+
+    assert_ends_in_every_phase(emulated_firmware, board, stop)
     status = board.ask()
     assert (status.state, status.fault) == (State.FAULT, Fault.EMERGENCY_STOP)
-    assert board.edges[-1].pin != ENABLE_PIN, "the drivers keep holding"
+    assert all(edge.pin != ENABLE_PIN for edge in board.edges), "the drivers keep holding"
 
 
 def test_two_emergency_bytes_and_another_do_nothing(firmware: Firmware) -> None:
@@ -204,6 +230,22 @@ def test_the_stop_input_ends_all_edges(firmware: Firmware) -> None:
     switches.set()
     board.ask(Clear())
     assert board.ask(Enable(1)).state is State.READY
+
+
+def test_the_stop_input_cuts_no_pulse(emulated_firmware: EmulatedFirmware) -> None:
+    board = Board(emulated_firmware)
+    switches = Switches(emulated_firmware)
+    board.hello()
+    board.ask(replace(WIRING, options=STOP_INPUT))
+    board.ask(Enable(1))
+    board.run(WAKE_TICKS)
+
+    def stop() -> int:
+        switches.set(stop_open=True)
+        return board.now
+
+    assert_ends_in_every_phase(emulated_firmware, board, stop)
+    assert board.ask().fault is Fault.STOP_INPUT
 
 
 def test_a_limit_hit_in_motion_is_a_fault_that_says_which_and_a_bounce_is_none(firmware: Firmware) -> None:

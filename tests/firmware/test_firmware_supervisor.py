@@ -4,30 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from firmware_board import Board, NativeFirmware
+from firmware_board import SUPERVISOR_EVENTS, Board, NativeFirmware
 from planarm_wire.messages import State
-
-EVENTS = [
-    "enable",
-    "release",
-    "segments",
-    "start",
-    "clear",
-    "hold",
-    "resume",
-    "stop",
-    "quick_stop",
-    "config",
-    "soft_limits",
-    "home",
-    "set_position",
-    "at_rest",
-    "starved",
-    "fed",
-    "done",
-    "clear_kept",
-]
-"""In the order of supervisor::Event."""
 
 S = State
 TABLE: dict[State, dict[str, State]] = {
@@ -103,21 +81,21 @@ WAYS = {
 
 
 @pytest.mark.parametrize("state", WAYS)
-@pytest.mark.parametrize("event", EVENTS)
+@pytest.mark.parametrize("event", SUPERVISOR_EVENTS)
 def test_every_event_in_every_state(native_firmware: NativeFirmware, state: State, event: str) -> None:
     Board(native_firmware)  # powers on
     for step in WAYS[state].split():
-        assert native_firmware.signal(EVENTS.index(step)), step
+        assert native_firmware.signal(SUPERVISOR_EVENTS.index(step)), step
     assert native_firmware.state() == state
-    allowed = native_firmware.signal(EVENTS.index(event))
+    allowed = native_firmware.signal(SUPERVISOR_EVENTS.index(event))
     assert allowed == (event in TABLE[state])
     assert native_firmware.state() == TABLE[state].get(event, state)
 
 
-@pytest.mark.parametrize("event", EVENTS)
+@pytest.mark.parametrize("event", SUPERVISOR_EVENTS)
 def test_a_fault_waits_for_clear(native_firmware: NativeFirmware, event: str) -> None:
     Board(native_firmware)
     native_firmware.latch(3)
-    allowed = native_firmware.signal(EVENTS.index(event))
+    allowed = native_firmware.signal(SUPERVISOR_EVENTS.index(event))
     assert allowed == (event in TABLE[S.FAULT])
     assert native_firmware.state() == TABLE[S.FAULT].get(event, S.FAULT)

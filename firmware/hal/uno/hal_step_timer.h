@@ -292,9 +292,11 @@ HAL_INLINE uint16_t end_steps() {
     return static_cast<uint16_t>(counter + END_TICKS);
 }
 
-// Passes the least high time of a pulse that may have risen just now, in turns of 3 cycles.
+// Turns of 3 cycles that pass the least high time of a pulse that may have risen just now.
+constexpr uint8_t HIGH_TURNS = planarm::wire::MIN_STEP_HIGH_TICKS / 3 + 1;
+
 inline void wait_step_high() {
-    uint8_t turns = planarm::wire::MIN_STEP_HIGH_TICKS / 3 + 1;
+    uint8_t turns = HIGH_TURNS;
     __asm__ __volatile__("1: dec %0\n\tbrne 1b" : "+r"(turns));
 }
 

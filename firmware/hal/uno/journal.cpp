@@ -71,13 +71,12 @@ void find_newest(Newest& at) {
     }
 }
 
-// A record that is still being written is written anew in its place: a mark never waits for another.
+// A record that is still being written is left as it is: a mark never waits for another, and however fast
+// they come, a cell is written once in a round.
 void begin_record(bool enabled) {
     Newest& at = by_base(newest);
-    if (at.unwritten == 0) {
-        at.record.mark += 2;
-        at.slot = static_cast<uint8_t>((at.slot + 1) % RECORDS);
-    }
+    at.record.mark += 2;
+    at.slot = static_cast<uint8_t>((at.slot + 1) % RECORDS);
     at.record.mark &= ~static_cast<__uint24>(1);
     if (enabled) at.record.mark |= 1;
     at.record.check = check_of(at.record);

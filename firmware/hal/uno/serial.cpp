@@ -102,11 +102,11 @@ static_assert(_SFR_MEM_ADDR(OCR1B) == _SFR_MEM_ADDR(TCCR1A) + 10, "%[tccra] + 10
 
 // The interrupts, in assembler with registers that no other code uses: see step_interrupts.cpp.
 
-// Cycles with entry and jump: 40 for a byte stored or one that finds no room, 44 after an overrun, 37 for a
-// hold, 42 for an emergency byte that is not the last. A byte comes every 640
-// at the fastest. Bytes lost before a hold or an emergency byte are not counted. After the last emergency
-// byte both pins are low 44 cycles after the interrupt's beginning; with a second match MIN_STEP_HIGH_TICKS
-// later.
+// Cycles with entry and jump: 40 for a byte stored or one that finds no room, 44 after an overrun, 32 for a
+// hold and for an emergency byte that is not the last. A byte comes every 640 at the fastest. Bytes lost
+// before a hold or an emergency byte are not counted. The last emergency byte, after which no step comes that
+// could be late, takes 108, with pulses of 15 us 294: no pin rises from the 32nd on, and those that are high
+// then fall the least high time later.
 ISR(USART_RX_vect, ISR_NAKED) {
     __asm__ __volatile__(
         R"(
@@ -176,21 +176,15 @@ ISR(USART_RX_vect, ISR_NAKED) {
     .Lend_pulses:                       ; for the cause in r3; the stop input's interrupt comes here, too
         ldi  r30, %[all_disarmed]
         sts  %[tccra], r30
-        .if %[second_match]
-        lds  r30, %[tccra] + 4          ; they fall after the least high time
-        lds  r31, %[tccra] + 5
-        subi r30, lo8(-(%[high]))
-        sbci r31, hi8(-(%[high]))
-        sts  %[tccra] + 9, r31
-        sts  %[tccra] + 8, r30
-        sts  %[tccra] + 11, r31
-        sts  %[tccra] + 10, r30
-        .else
+        ldi  r30, %[only_laps]
+        sts  %[timsk], r30
+        .if %[all_disarmed]
+        ldi  r30, %[high_turns]         ; a pulse that has just risen lasts as long as the drivers need
+    8:  dec  r30
+        brne 8b
         ldi  r30, %[all_forced]
         sts  %[tccra] + 2, r30
         .endif
-        ldi  r30, %[only_laps]
-        sts  %[timsk], r30
         .if %[joints] > 2
         ldi  r30, 0
         sts  %[scheduled_on], r30
@@ -210,14 +204,13 @@ ISR(USART_RX_vect, ISR_NAKED) {
         [full] "i"(&hal::ring_full), [overruns] "I"(_SFR_IO_ADDR(OVERRUNS)), [holds] "i"(&hal::holds),
         [repeats] "M"(planarm::wire::EMERGENCY_REPEATS), [all_disarmed] "i"(hal::ALL_DISARMED),
         [all_forced] "M"(_BV(FOC1A) | _BV(FOC1B)), [tccra] "i"(&TCCR1A),
-        [second_match] "n"(hal::SECOND_MATCH ? 1 : 0),
-        [high] "n"(static_cast<uint16_t>(planarm::wire::MIN_STEP_HIGH_TICKS)), [timsk] "i"(&TIMSK1),
+        [high_turns] "M"(hal::HIGH_TURNS), [timsk] "i"(&TIMSK1),
         [only_laps] "M"(hal::ONLY_LAPS), [line] "M"(static_cast<uint8_t>(hal::Emergency::LINE)),
         [emergencies] "i"(&hal::emergencies), [cause] "i"(&hal::emergency_cause),
         [joints] "n"(planarm::wire::JOINTS), [scheduled_on] "i"(&hal::scheduled_on), [timsk2] "i"(&TIMSK2));
 }
 
-// The stop input's contact opened: what the last emergency byte does.
+// The stop input's contact opened: what the last emergency byte does, in 94 or 280 cycles; 12 when it closes.
 ISR(PCINT1_vect, ISR_NAKED) {
     __asm__ __volatile__(
         R"(
