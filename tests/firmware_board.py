@@ -117,9 +117,9 @@ class EmulatedFirmware:
 
     BOOT_CYCLES = 500_000
 
-    def __init__(self, image: Path, wiring: Wiring = UNO) -> None:
+    def __init__(self, image: Path, wiring: Wiring = UNO, *, bootloader: Path | None = None) -> None:
         self.wiring = wiring
-        self.uno = Uno.from_hex(image, baud=BAUD)
+        self.uno = Uno.from_hex(image, baud=BAUD, bootloader=bootloader)
         self.uno.run(cycles=self.BOOT_CYCLES)
         self.uno.clear_edges()
         self._booted = self.uno.snapshot()

@@ -26,11 +26,11 @@ FAST = Profile((20_000.0, 12_360.0), (400_000.0, 400_000.0), 0.8, 30).motion()
 class Player:
     """Streams a motion to a board that has just been powered on, and notes what it tells."""
 
-    def __init__(self, firmware: Firmware, motion: HoldableMotion) -> None:
+    def __init__(self, firmware: Firmware, motion: HoldableMotion, *, options: int = 0) -> None:
         self.motion = motion
         self.board = Board(firmware)
         self.board.hello()
-        config = Config(PinMap.OWN, JOINTS, 0, 0, 0, 0, 0, motion.start_stop_ticks)
+        config = Config(PinMap.OWN, JOINTS, 0, options, 0, 0, 0, motion.start_stop_ticks)
         assert self.board.ask(config).refusal == 0
         self.board.ask(Enable(1))
         self.board.run(WAKE_TICKS)

@@ -160,9 +160,13 @@ def assert_near_schedule(board: Board, name: str, motion: list[Segment], status:
 def test_pins_are_quiet_from_reset_on(name: str) -> None:
     wiring = BOARDS[name]
     uno = emulated(name).uno
+    uno.pin(wiring.enable_pin).drive(1)  # the pull-up
     uno.reset()
+    uno.clear_edges()
     uno.run(cycles=600_000)
-    assert uno.pin(wiring.enable_pin).level == 1
+    assert len(uno.edges(wiring.enable_pin)) == 0
+    uno.pin(wiring.enable_pin).drive(0)
+    assert uno.pin(wiring.enable_pin).level == 1, "driven by the chip"
     assert [len(uno.edges(pin)) for pin in (*wiring.step_pins, *wiring.dir_pins)] == [0] * 2 * wiring.joints
     assert all(uno.pin(pin).level == 1 for pin in (*wiring.limit_pins, wiring.stop_pin)), "pulled up"
 

@@ -33,6 +33,7 @@ from planarm_wire.messages import (
     Segment,
     Segments,
     Start,
+    State,
 )
 
 IMAGE = Path(__file__).parents[2] / "firmware" / "release" / "uno.hex"
@@ -177,19 +178,27 @@ def test_transmit_interrupt(tracer: Tracer) -> None:
 
 
 def test_receive_interrupt_without_room(tracer: Tracer) -> None:
-    # The main program stands still, on a jump to itself: the ring fills up.
-    board = play(tracer, end_motion([segment_of(200_000, run_of(2))]))
+    # The main program stands still, on a jump to itself: the ring fills up. A hold finds its way past it.
+    board = play(tracer, end_motion([segment_of(4_000_000, run_of(1, first=3_000_000))]))
     tracer.run_until(lambda: bool(tracer.chip.sreg & INTERRUPTS_ON))
     tracer.done.clear()
-    code = tracer.uno.flash
-    tracer.chip.pc = next(word for word in range(len(code) // 2) if code[2 * word : 2 * word + 2] == JUMP_TO_ITSELF)
-    board.receive(bytes(130))
+    code, left_at = tracer.uno.flash, tracer.chip.pc
+    stop = next(word for word in range(len(code) // 2) if code[2 * word : 2 * word + 2] == JUMP_TO_ITSELF)
+    tracer.chip.pc = stop
+    board.receive(bytes([*bytes(130), HOLD_CODE]))
 
     def received() -> list[int]:
         return [cycles for number, cycles in tracer.done if number == RECEIVE]
 
-    tracer.run_until(lambda: len(received()) == 130)
-    assert received() == [*[RECEIVE_CYCLES] * 128, *[FULL_CYCLES] * 2]
+    tracer.run_until(lambda: len(received()) == 131)
+    assert received() == [*[RECEIVE_CYCLES] * 128, *[FULL_CYCLES] * 2, HOLD_CYCLES]
+    assert tracer.chip.pc == stop
+    tracer.chip.pc = left_at
+    tracer.run = super(Tracer, tracer).run  # type: ignore[method-assign]
+    board.run(100_000)
+    board.receive(bytes([DELIMITER]))
+    status = board.ask()
+    assert (status.state, status.ring_full) == (State.HELD, 2)
 
 
 @pytest.mark.parametrize("ms", [5, 9, 13, 60, 200])

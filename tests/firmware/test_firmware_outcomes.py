@@ -12,18 +12,15 @@ from enum import Enum, auto
 
 import pytest
 
-from firmware_board import SUPERVISOR_EVENTS, WAKE_TICKS, Edge, NativeFirmware, room_after
+from firmware_board import SUPERVISOR_EVENTS, Edge, NativeFirmware, room_after
 from firmware_player import FAST, Player
 from planarm_wire.messages import (
     DEBOUNCE_TICKS,
     ENABLE_PIN,
     HOLD_CODE,
-    JOINTS,
-    Config,
     Enable,
     Fault,
     Home,
-    PinMap,
     State,
     Status,
     Stop,
@@ -119,17 +116,13 @@ def run_up_to(player: Player, state: State) -> Status:
 
 def come_to(firmware: NativeFirmware, state: State) -> Player:
     """A board in a state; where one has a motion, it is queued, and at its full pace before it slows down."""
-    player = Player(firmware, FAST)
+    player = Player(firmware, FAST, options=LIMIT_SWITCHES)
     board = player.board
     if state is S.IDLE:
         board.ask(Enable(0))
     elif state is S.READY:
         player.fill()
     elif state is S.HOMING:
-        board.ask(Enable(0))
-        board.ask(Config(PinMap.OWN, JOINTS, 0, LIMIT_SWITCHES, 0, 0, 0, FAST.start_stop_ticks))
-        board.ask(Enable(1))
-        board.run(WAKE_TICKS)
         board.ask(Home(0, 1, HOMING_TICKS, 2 * DEBOUNCE_TICKS, 1000, 100))
         board.run(10 * HOMING_TICKS)
     elif state is S.FAULT:
@@ -239,3 +232,13 @@ SHOWN_BY: dict[Outcome, Callable[[NativeFirmware, State, str], None]] = {
 @pytest.mark.parametrize(("state", "event"), [(state, event) for state, events in OUTCOMES.items() for event in events])
 def test_every_rows_outcome(native_firmware: NativeFirmware, state: State, event: str) -> None:
     SHOWN_BY[OUTCOMES[state][event]](native_firmware, state, event)
+
+
+@pytest.mark.parametrize("state", [S.RUNNING, S.HOLDING, S.STOPPING])
+def test_a_limit_switch_is_watched_wherever_joints_move(native_firmware: NativeFirmware, state: State) -> None:
+    player = come_to(native_firmware, state)
+    native_firmware.set_inputs(0b10)
+    player.board.run(DEBOUNCE_TICKS + 2 * MS_TICKS)
+    status = player.board.ask_now()
+    assert (status.state, status.fault, status.detail) == (S.FAULT, Fault.LIMIT_SWITCH, 1)
+    assert status.ledger.position_usteps[0] != 0

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable
+from pathlib import Path
 
 import pytest
 
@@ -35,9 +36,12 @@ from planarm_wire.messages import (
     State,
     Welcome,
 )
+from sim_board.optiboot import build_optiboot
 
 BOOT_CYCLES = 600_000
+BOOT_LOADER_CYCLES = 2 * 16_000_000
 BYTE_CYCLES = 640
+IMAGE = Path(__file__).parents[2] / "firmware" / "release" / "uno.hex"
 WRITE_CYCLES = 54_400  # 3.4 ms a byte
 MARK_CYCLES = 4 * WRITE_CYCLES
 JUMP_TO_ITSELF = b"\xff\xcf"  # rjmp .-2
@@ -71,6 +75,44 @@ def test_why_the_chip_started(
     board = Board(emulated_firmware)
     assert reset_and_ask(emulated_firmware, board, cause, hidden=False).reset_cause is shown
     assert reset_and_ask(emulated_firmware, board, cause, hidden=True).reset_cause is behind_a_boot_loader
+
+
+@pytest.fixture(scope="module")
+def behind_optiboot(tmp_path_factory: pytest.TempPathFactory) -> EmulatedFirmware:
+    return EmulatedFirmware(IMAGE, bootloader=build_optiboot(tmp_path_factory.mktemp("optiboot")))
+
+
+@pytest.mark.parametrize(
+    ("cause", "told"),
+    [
+        (ResetCause.POWER_ON, Reset.POWER_ON),
+        (ResetCause.EXTERNAL, Reset.UNKNOWN),
+        (ResetCause.BROWN_OUT, Reset.UNKNOWN),
+    ],
+)
+def test_why_the_chip_started_behind_the_stock_boot_loader(
+    behind_optiboot: EmulatedFirmware, cause: ResetCause, told: Reset
+) -> None:
+    # After an external reset it waits for an upload for about a second, and starts the program by its own watchdog.
+    board = Board(behind_optiboot)
+    board.get_ready()
+    behind_optiboot.uno.reset(cause)
+    board.forget_replies()
+    board.run(BOOT_LOADER_CYCLES if cause is ResetCause.EXTERNAL else BOOT_CYCLES)
+    board.forget_replies()
+    welcome = board.hello()
+    assert (welcome.reset_cause, welcome.interrupted) == (told, 1)
+
+
+def test_the_watchdogs_reset_is_told_behind_the_stock_boot_loader(behind_optiboot: EmulatedFirmware) -> None:
+    board = Board(behind_optiboot)
+    board.get_ready()
+    uno, code = behind_optiboot.uno, behind_optiboot.uno.flash
+    uno._chip.pc = next(word for word in range(len(code) // 2) if code[2 * word : 2 * word + 2] == JUMP_TO_ITSELF)
+    board.run(3 * WATCHDOG_MS * TICKS_HZ // 1000)
+    board.forget_replies()
+    welcome = board.hello()
+    assert (welcome.reset_cause, welcome.interrupted) == (Reset.WATCHDOG, 1)
 
 
 @pytest.mark.parametrize("hidden", [False, True], ids=["MCUSR as it is", "MCUSR cleared"])

@@ -19,6 +19,8 @@ from firmware_board import (
     run_of,
     segment_of,
 )
+from planarm_wire.codec import encode
+from planarm_wire.framing import encode_frame
 from planarm_wire.messages import (
     BAUD,
     DEBOUNCE_TICKS,
@@ -37,6 +39,7 @@ from planarm_wire.messages import (
     PinMap,
     Query,
     Result,
+    Resume,
     Segments,
     SetPosition,
     SoftLimits,
@@ -136,6 +139,54 @@ def test_an_emergency_in_the_middle_of_a_frame_and_with_a_full_ring(firmware: Fi
     board.run(100_000)
     assert board.ask().fault is Fault.EMERGENCY_STOP
     assert board.ask(Clear()).fault is Fault.NONE
+
+
+def test_a_hold_in_the_middle_of_a_frame_acts_and_leaves_the_frame_whole(firmware: Firmware) -> None:
+    board = configured(firmware)
+    for segment in end_motion([segment_of(400_000, run_of(1))] * 8):
+        board.ask(Segments(0, 0, 0, (segment,)))
+    board.ask(Start(LEAD_TICKS))
+    board.run(600_000)
+    for at in range(1, len(encode_frame(0, *encode(Query())))):
+        frame = encode_frame(board.seq, *encode(Query()))
+        board.forget_replies()
+        board.receive(frame[:at] + bytes([HOLD_CODE]) + frame[at:])
+        board.run(60_000)
+        assert board.seq in {seq for seq, _ in board.replies}, "the frame is answered"
+        board.seq += 1
+        status = board.ask()
+        assert (status.state, status.crc_errors) == (State.HELD, 0), (at, status)
+        assert board.ask(Resume()).state is State.RUNNING
+
+
+@pytest.mark.parametrize("interval", [5000, 12_000])
+def test_a_hold_below_the_start_stop_speeds_rests_within_a_millisecond(
+    emulated_firmware: EmulatedFirmware, interval: int
+) -> None:
+    board = Board(emulated_firmware)
+    board.hello()
+    board.ask(replace(WIRING, start_stop_ticks=(4000, 4000)))
+    board.ask(Enable(1))
+    board.run(WAKE_TICKS)
+    steps = 240_000 // interval
+    move = run_of(steps, first=0, interval=interval)
+    for segment in end_motion([segment_of(240_000, move, move)] * 10):
+        board.ask(Segments(0, 0, 0, (segment,)))
+    board.send(Start(LEAD_TICKS))
+    board.run(LEAD_TICKS + 300_000)
+    uno, seq = emulated_firmware.uno, board.seq
+    moving_on = uno.snapshot()
+    for phase in range(0, interval, 250):
+        uno.restore(moving_on)
+        board.edges.clear()
+        board.forget_replies()
+        board.seq = seq
+        board.run(phase)
+        board.receive(bytes([HOLD_CODE]))
+        told = board.now + BYTE_TICKS
+        board.run(100_000)
+        assert max(board.rises(0), default=0) <= told + 16_000, phase
+        assert board.ask_now().state is State.HELD
 
 
 def test_an_emergency_releases_the_drivers_when_told_to(firmware: Firmware) -> None:

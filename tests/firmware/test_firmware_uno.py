@@ -47,6 +47,7 @@ from planarm_wire.messages import (
 IMAGE = Path(__file__).parents[2] / "firmware" / "release" / "uno.hex"
 RESET_TO_PINS_CYCLES = 32  # 2 us, with a look at the EEPROM for ENABLE's polarity
 BOOT_CYCLES = 600_000
+POLARITY_ADDRESS, ACTIVE_HIGH = 1023, 0x01  # firmware/hal/uno/polarity.h
 
 
 def boot_nonce(uno: Uno) -> int:
@@ -69,6 +70,24 @@ def test_drivers_are_released_at_once_and_nothing_else_moves() -> None:
     assert uno.edges(ENABLE_PIN)["level"].tolist() == [1], "the pull-up, and high ever since"
     assert uno.edges(ENABLE_PIN)["cycle"][0] <= RESET_TO_PINS_CYCLES
     assert [len(uno.edges(pin)) for pin in (*STEP_PINS, *DIR_PINS)] == [0] * 4
+
+
+@pytest.mark.parametrize("high", [0, 1])
+def test_enable_is_never_driven_against_what_holds_it(high: int) -> None:
+    # A resistor keeps the drivers off until the firmware runs; CONFIG's polarity is in EEPROM by then, or nothing is.
+    # Undriven, a pin that the firmware drives low for a moment would look like one that floats.
+    uno = Uno.from_hex(IMAGE, baud=BAUD)
+    if not high:
+        uno._chip.eeprom[POLARITY_ADDRESS] = ACTIVE_HIGH
+    uno.pin(ENABLE_PIN).drive(high)
+    uno.reset()
+    uno.clear_edges()
+    uno.run(cycles=BOOT_CYCLES)
+    assert uno.pin(ENABLE_PIN).level == high
+    assert len(uno.edges(ENABLE_PIN)) == 0
+    uno.pin(ENABLE_PIN).drive(1 - high)
+    uno.run(cycles=100)
+    assert uno.pin(ENABLE_PIN).level == high, "driven by the chip, not by the resistor alone"
 
 
 def test_every_reset_gives_another_nonce() -> None:

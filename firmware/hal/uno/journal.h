@@ -7,9 +7,9 @@
 // check, or has that old number, too, and counts for no more; or the lowest byte alone is missing and had
 // been the same, which makes it whole. The newest whole record stays the newest, and the one behind a torn
 // record has the higher number: an order that stands for 17 ms is told after a reset, of shorter ones the
-// last whose record became whole. No step is made before its mark is. A supply that fails within the 3.4 ms of
-// a byte may leave anything there: the check finds every change of one byte, and where others are still old,
-// all but one in 256.
+// last whose record became whole. No step is made before its mark is. A supply that fails within the 3.4 ms
+// of a byte may leave anything there: the check finds every change of one byte, and where others are still
+// old, all but one in 256.
 #pragma once
 
 #include <stdint.h>

@@ -203,11 +203,11 @@ ISR(USART_RX_vect, ISR_NAKED) {
         [run] "I"(_SFR_IO_ADDR(EMERGENCY_RUN)), [ring] "i"(hal::ring), [size] "i"(hal::RX_RING_BYTES),
         [full] "i"(&hal::ring_full), [overruns] "I"(_SFR_IO_ADDR(OVERRUNS)), [holds] "i"(&hal::holds),
         [repeats] "M"(planarm::wire::EMERGENCY_REPEATS), [all_disarmed] "i"(hal::ALL_DISARMED),
-        [all_forced] "M"(_BV(FOC1A) | _BV(FOC1B)), [tccra] "i"(&TCCR1A),
-        [high_turns] "M"(hal::HIGH_TURNS), [timsk] "i"(&TIMSK1),
-        [only_laps] "M"(hal::ONLY_LAPS), [line] "M"(static_cast<uint8_t>(hal::Emergency::LINE)),
-        [emergencies] "i"(&hal::emergencies), [cause] "i"(&hal::emergency_cause),
-        [joints] "n"(planarm::wire::JOINTS), [scheduled_on] "i"(&hal::scheduled_on), [timsk2] "i"(&TIMSK2));
+        [all_forced] "M"(_BV(FOC1A) | _BV(FOC1B)), [tccra] "i"(&TCCR1A), [high_turns] "M"(hal::HIGH_TURNS),
+        [timsk] "i"(&TIMSK1), [only_laps] "M"(hal::ONLY_LAPS),
+        [line] "M"(static_cast<uint8_t>(hal::Emergency::LINE)), [emergencies] "i"(&hal::emergencies),
+        [cause] "i"(&hal::emergency_cause), [joints] "n"(planarm::wire::JOINTS),
+        [scheduled_on] "i"(&hal::scheduled_on), [timsk2] "i"(&TIMSK2));
 }
 
 // The stop input's contact opened: what the last emergency byte does, in 94 or 280 cycles; 12 when it closes.
