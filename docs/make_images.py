@@ -94,6 +94,7 @@ def _draw_pull_out(target: Path) -> None:
 
 
 GROWTH_CELLS_CM = (2.0, 1.0, 0.5, 0.25, 0.125)
+NAMES = {"a_star": "A*", "modified_a_star": "Modified A*", "chs": "CHS"}
 GROWTH_STENCILS: tuple[tuple[Algorithm, int], ...] = (
     ("a_star", 8),
     ("modified_a_star", 24),
@@ -117,7 +118,7 @@ def _draw_growth(target: Path) -> None:
     for k, (algorithm, neighbours) in enumerate(GROWTH_STENCILS[::2]):
         results = [row[2 * k] for row in work]
         left.loglog(
-            free, [r.expanded for r in results], "o-", color=JOINT_COLOURS[k], label=f"{algorithm} {neighbours}"
+            free, [r.expanded for r in results], "o-", color=JOINT_COLOURS[k], label=f"{NAMES[algorithm]} {neighbours}"
         )
     left.loglog(free, free, "--", color=QUIET, label="all free nodes")
     left.set_xlabel("free nodes of the map")
@@ -127,6 +128,8 @@ def _draw_growth(target: Path) -> None:
         values = [(r.expanded, r.generated)[place] for r in work[-1]]
         right.plot(counts, values, marker, color=JOINT_COLOURS[place], label=name)
     right.set_xlabel(f"neighbours, cells of {GROWTH_CELLS_CM[-1]:g} cm")
+    right.set_ylabel("nodes")
+    right.yaxis.set_major_formatter("{x:,.0f}")
     right.set_ylim(bottom=0.0)
     for axes in (left, right):
         dress(axes)

@@ -84,7 +84,7 @@ def test_every_kind_of_fault_is_in_some_scenario():
 
 def test_the_same_schedule_gives_the_same_run_and_another_seed_another(plan, tmp_path):
     path = tmp_path / "noise.toml"
-    path.write_text('seed = 1\nzero = "power_up"\n[[faults]]\nkind = "line.flip"\nshare = 0.02\n')
+    path.write_text('seed = 1\nzero = "power_up"\n[[faults]]\nkind = "line.flip"\nshare = 0.005\n')
     first, again = Outcome(plan, path), Outcome(plan, path)
     np.testing.assert_array_equal(first.arm.record.q_rad, again.arm.record.q_rad)
     assert first.arm.record.faults == again.arm.record.faults

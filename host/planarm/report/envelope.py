@@ -88,7 +88,8 @@ def draw_cell_maps(
         axes.set_xlabel("x (cm)", fontsize=TEXT_SIZE, color=QUIET)
         axes.set_ylabel("y (cm)", fontsize=TEXT_SIZE, color=QUIET)
         beyond = bool(np.nanmax(one.values) > one.most)
-        bar = figure.colorbar(image, ax=axes, shrink=0.9, extend="max" if beyond else "neither")
+        beside = axes.inset_axes((1.03, 0.0, 0.035, 1.0))  # as high as the map
+        bar = figure.colorbar(image, cax=beside, extend="max" if beyond else "neither")
         bar.set_label(one.unit, fontsize=TEXT_SIZE, color=QUIET)
         bar.ax.tick_params(labelsize=TEXT_SIZE, colors=QUIET, labelcolor=INK)
     save(figure, path_png)
