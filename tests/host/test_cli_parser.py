@@ -55,6 +55,8 @@ def test_what_was_meant_is_said(words, said, capsys):
         (["run", ARM, "--faults", "none.toml"], "none.toml: cannot be read: No such file or directory; give"),
         (["run", ARM, "--out", ARM], f"{ARM}: cannot be written: "),
         (["run", ARM, "--out", f"{ARM}/deeper"], "arm.toml is a file; give the path of a folder"),
+        (["envelope", ARM, "--out", ARM], "arm.toml is a file; give the path of a folder"),
+        (["campaign", "examples/sweeps/line_faults.toml", "--out", ARM], "arm.toml is a file; give the path of"),
         (["stream", "none.plan"], "none.plan: cannot be read"),
         (["timing", "none.vcd"], "give the path of a VCD"),
         (["timing", "diff", ARM, "none.vcd"], "none.vcd: cannot be read"),
@@ -64,7 +66,8 @@ def test_what_was_meant_is_said(words, said, capsys):
 )
 def test_what_cannot_be_is_refused_before_anything_is_done(words, said, capsys, monkeypatch, pytestconfig):
     monkeypatch.chdir(pytestconfig.rootpath)
-    for module in ("run.compile_first", "stream.tell_first_compile", "timing.tell_first_compile"):
+    first = "stream.tell_first_compile", "timing.tell_first_compile", "campaign.tell_first_compile"
+    for module in ("run.compile_first", "envelope.compile_first", *first):
         monkeypatch.setattr(f"planarm.cli.{module}", lambda *_: pytest.fail("began"))
     code, out = told(words, capsys)
     assert code == 2

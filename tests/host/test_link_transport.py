@@ -117,8 +117,10 @@ def test_a_port_that_is_not_there():
 def test_a_file_that_is_no_port(tmp_path):
     file = tmp_path / "file"
     file.write_text("")
-    with pytest.raises(LinkError, match="cannot be opened at 250000 baud"):
+    with pytest.raises(LinkError, match=r"file: is a file, no serial device; serial ports found here: "):
         open_transport(str(file))
+    with pytest.raises(LinkError, match=r"is a folder, no serial device; serial ports found here: "):
+        open_transport(str(tmp_path))
 
 
 def test_a_forbidden_port_names_the_group_to_join(tmp_path, monkeypatch):
@@ -207,14 +209,17 @@ def test_the_emulators_bridge_passes_a_session_on():
         assert decode(frame.type_code, frame.payload).host_nonce == 7
 
 
+@pytest.mark.parametrize(
+    ("device", "why"), [("/dev/tty-none", "not found"), (str(EXAMPLES), "is a folder, no serial device")]
+)
 @pytest.mark.parametrize("command", ["run", "replan"])
-def test_a_device_that_is_not_there_is_told_before_anything_is_planned(command, tmp_path, capsys):
+def test_a_device_that_is_none_is_told_before_anything_is_planned(command, device, why, tmp_path, capsys):
     arrivals = tmp_path / "later.toml"
     arrivals.write_text('[[obstacles]]\nshape = "circle"\ncenter_cm = [0, 40]\ndiameter_cm = 2\nat_s = 0.5\n')
     more = ["--arrivals", str(arrivals)] if command == "replan" else []
     with pytest.raises(SystemExit) as left:
-        main([command, str(EXAMPLES / "energy_two_links.toml"), *more, "--port", "/dev/tty-none"])
+        main([command, str(EXAMPLES / "energy_two_links.toml"), *more, "--port", device])
     said = capsys.readouterr().err
     assert left.value.code == 5
-    assert "port /dev/tty-none: not found" in said
+    assert f"port {device}: {why}" in said
     assert "plan:" not in said and "kernels" not in said

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 from planarm.cli.scenes import tell_first_compile
 from planarm.cli.terminal import terminal
 from planarm.errors import UsageError
+from planarm.output import require_folder_place
 
 if TYPE_CHECKING:
     from planarm.campaign.run import Outcome, Progress
@@ -24,6 +25,9 @@ STOPPED = 130
 
 def execute(options: argparse.Namespace) -> int:
     """Run what is missing, write it down, and tell the verdicts; 130 after Ctrl-C, with everything finished kept."""
+    out = Path(options.out) if options.out else None
+    if out:
+        require_folder_place(out)
     tell_first_compile("planarm", "planarm_sim")
     from planarm.campaign.dask_engine import DaskEngine
     from planarm.campaign.engine import LocalEngine
@@ -35,7 +39,7 @@ def execute(options: argparse.Namespace) -> int:
         return _only(options.only, campaign, options.json)
     if options.dask and options.workers:
         raise UsageError("--workers goes with this machine's own processes; a cluster has its own number")
-    out = Path(options.out) if options.out else Path("out") / campaign.name
+    out = out or Path("out") / campaign.name
     with DaskEngine(options.dask, campaign.cluster_s) if options.dask else nullcontext() as cluster:
         engine = cluster or LocalEngine(options.workers or os.cpu_count() or 1)
         outcome = run_campaign(campaign, engine, out, options.resume, _teller(options.json))

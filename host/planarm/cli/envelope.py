@@ -14,7 +14,7 @@ from planarm.cli.progress import progress
 from planarm.cli.scenes import chosen_scene, compile_first
 from planarm.cli.terminal import terminal
 from planarm.notice import silent
-from planarm.output import writing
+from planarm.output import require_folder_place, writing
 
 if TYPE_CHECKING:
     from planarm.envelope.largest import Certify
@@ -31,6 +31,8 @@ def execute(options: argparse.Namespace) -> int:
     import numpy as np
 
     scene = chosen_scene(options)
+    out = Path(options.out or Path("out") / f"{Path(scene.source).stem}-envelope")
+    require_folder_place(out)
     compile_first("planarm")
     from planarm.envelope.largest import MOST_TRIALS, largest_feed, largest_payload_kg
     from planarm.envelope.maps import envelope_maps
@@ -38,7 +40,6 @@ def execute(options: argparse.Namespace) -> int:
     from planarm.pipeline import plan_scene
     from planarm.warm_up import warm_up
 
-    out = Path(options.out or Path("out") / f"{Path(scene.source).stem}-envelope")
     with writing(out):
         out.mkdir(parents=True, exist_ok=True)
     side: ElbowSide = "down" if scene.arm.elbow == "down" else "up"

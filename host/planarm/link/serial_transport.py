@@ -100,8 +100,17 @@ def _open(url: str, baud: int) -> serial.SerialBase:
 
 def not_found(url: str) -> str:
     """Say that there is no such port, and which there are."""
-    found = ", ".join(port.device for port in serial.tools.list_ports.comports()) or "none"
-    return f"port {url}: not found; serial ports found here: {found}"
+    return f"port {url}: not found; serial ports found here: {_found()}"
+
+
+def no_device(url: str) -> str:
+    """Say that what is at a path is no serial device, and which there are."""
+    what = "a folder" if Path(url).is_dir() else "a file"
+    return f"port {url}: is {what}, no serial device; serial ports found here: {_found()}"
+
+
+def _found() -> str:
+    return ", ".join(port.device for port in serial.tools.list_ports.comports()) or "none"
 
 
 def _why_not_opened(url: str, baud: int, error: Exception) -> str:
@@ -113,6 +122,8 @@ def _why_not_opened(url: str, baud: int, error: Exception) -> str:
     if code in (errno.EBUSY, errno.EAGAIN, errno.EWOULDBLOCK):
         others = ", ".join(str(one) for one in holders(url) if one.pid != os.getpid()) or "another program"
         return f"port {url}: in use by {others}; close that program first"
+    if "://" not in url and Path(url).exists() and not Path(url).is_char_device():
+        return no_device(url)
     return f"port {url}: cannot be opened at {baud} baud ({error})"
 
 

@@ -145,7 +145,7 @@ class _Emulated:
 
 
 def require_port(url: str, board: Board) -> None:
-    """Check that a URL names no device that is not there, nor another board than a scene's, before anything is made.
+    """Check that a URL names a device that is there, and no other board than a scene's, before anything is made.
 
     A real board tells what it is when it is opened, and so does a flash image of one's own.
 
@@ -155,10 +155,10 @@ def require_port(url: str, board: Board) -> None:
     inner = url.removeprefix(SPY_PREFIX).partition("#")[0] if url.startswith(SPY_PREFIX) else url
     if inner.lower().startswith(f"{SIM_SCHEME}://"):
         _emulated(inner, board)
-    elif inner.startswith("/") and not Path(inner).exists():
-        from planarm.link.serial_transport import not_found  # noqa: PLC0415 - pyserial only where it is used
+    elif inner.startswith("/") and not Path(inner).is_char_device():
+        from planarm.link.serial_transport import no_device, not_found  # noqa: PLC0415 - pyserial only where it is used
 
-        raise LinkError(not_found(inner))
+        raise LinkError(no_device(inner) if Path(inner).exists() else not_found(inner))
 
 
 def _emulated(url: str, wanted: Board | None) -> _Emulated:
