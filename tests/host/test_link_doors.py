@@ -128,6 +128,9 @@ def test_holders_are_found_in_proc(tmp_path):
         (descriptors.parent / "cmdline").write_bytes(command)
     (tmp_path / "proc" / "9").mkdir()
     assert holders(str(device), tmp_path / "proc") == (Holder(7, "screen /dev/ttyACM0"),)
+    (tmp_path / "proc/7/cmdline").write_bytes(b"python\0-c\0import time\ntime.sleep(9)\0")
+    (told,) = holders(str(device), tmp_path / "proc")
+    assert told.command == "python -c import time time.sleep(9)", "one line, whatever the process was given"
 
 
 @pytest.mark.parametrize(

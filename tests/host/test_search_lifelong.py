@@ -1,85 +1,20 @@
 """A*, D* Lite and MPD* Lite against a plain Dijkstra after every change of random graphs, and on walks over grids."""
 
-import heapq
 import math
 import random
-from itertools import pairwise
 
 import numpy as np
 import pytest
 
+from lifelong_graphs import Doors, RandomGraph, Walk, dijkstra, path_cost
 from planarm.search.ahead import SOON, begin_ahead, is_lost, new_ahead
-from planarm.search.digraph import BELOW_ONE, Bounds, bound, digraph
-from planarm.search.incremental import Changes, GraphPlanner, landmarks
-from planarm.search.indexed_heap import new_heap, put, take_out
-from planarm.search.lifelong import DONE, best_first, change, mark_stored, new_lifelong, repair
-from planarm.search.read_off import gradient_path, stored_path
+from planarm.search.digraph import Bounds, digraph
+from planarm.search.incremental import Changes, GraphPlanner
+from planarm.search.lifelong import DONE, best_first, mark_stored, new_lifelong
 from planarm.search.result import SearchStatus
-from planarm.search.stored_tree import TOO_MANY, change_costs, change_stored
+from planarm.search.stored_tree import change_costs
 
 ALGORITHMS = ("roadmap_a_star", "d_star_lite", "mpd_star_lite")
-
-
-def dijkstra(graph, goal):
-    """Every node's distance to the goal."""
-    into = {}
-    for tail, head, cost in zip(graph.tail.tolist(), graph.head.tolist(), graph.cost.tolist(), strict=True):
-        into.setdefault(head, []).append((tail, cost))
-    distance, waiting = {}, [(0.0, goal)]
-    while waiting:
-        value, node = heapq.heappop(waiting)
-        if node not in distance:
-            distance[node] = value
-            for tail, cost in into.get(node, ()):
-                if cost < math.inf:
-                    heapq.heappush(waiting, (value + cost, tail))
-    return distance
-
-
-def path_cost(graph, nodes):
-    """What a path costs; the cheapest of parallel edges."""
-    total = 0.0
-    for a, b in pairwise(nodes):
-        total += min(graph.cost[e] for e in range(len(graph.cost)) if graph.tail[e] == a and graph.head[e] == b)
-    return total
-
-
-class RandomGraph:
-    """A random directed graph, costs never below a floor, so that landmarks of the floor stay valid."""
-
-    def __init__(self, rng, *, parallel=True):
-        self.rng = rng
-        self.count = rng.randrange(4, 40)
-        wanted = self.count * rng.choice([2, 3, 5])
-        ends = [(rng.randrange(self.count), rng.randrange(self.count)) for _ in range(wanted)]
-        if not parallel:
-            ends = sorted(set(ends))
-        self.tail, self.head = np.array(ends).T
-        self.floor = np.array([float(rng.choice([0.5, 1, 1, 2, 3.7, 8])) for _ in ends])
-        self.goal = rng.randrange(self.count)
-
-    def cost(self, edge):
-        rng = self.rng
-        return math.inf if rng.random() < 0.15 else float(self.floor[edge]) * rng.choice([1.0, 1.0, 1.5, 3.0])
-
-    def graph(self):
-        return digraph(self.count, self.tail, self.head, [self.cost(e) for e in range(len(self.tail))])
-
-    def edit(self):
-        """Edges raised and lowered, or a node removed."""
-        rng = self.rng
-        if rng.random() < 0.25:
-            node = rng.randrange(self.count)
-            edges = np.flatnonzero((self.tail == node) | (self.head == node))
-            return Changes(edges, np.full(len(edges), np.inf))
-        edges = np.array(rng.sample(range(len(self.tail)), rng.randrange(1, 5)))
-        return Changes(edges, np.array([self.cost(e) for e in edges]))
-
-    def bounds(self):
-        if self.rng.random() < 0.3:
-            return Bounds.none(self.count)
-        base = digraph(self.count, self.tail, self.head, self.floor)
-        return Bounds(landmarks(base, np.array([0, self.count - 1])), np.empty((self.count, 0)))
 
 
 def test_all_equal_dijkstra_after_every_change_of_random_graphs(sized):
@@ -142,132 +77,6 @@ def test_moves_that_cost_nothing_lead_nobody_round_and_round(algorithm, sized):
             edges = np.array(rng.sample(range(len(tail)), 2))
             planner.change(Changes(edges, np.array([float(rng.choice([0, 1, 2, math.inf])) for _ in edges])))
             planner.move_start(rng.randrange(count))
-
-
-@pytest.mark.parametrize("seed", range(20))
-def test_the_stored_path_is_the_one_that_the_gradient_gives(seed):
-    """And is read off with one look a node, where the gradient takes one for each of their successors."""
-    rng = random.Random(seed)
-    made = RandomGraph(rng, parallel=False)
-    graph, start = made.graph(), rng.randrange(made.count)
-    state = new_lifelong(graph, start, made.goal, stores=True)
-    bounds = made.bounds()
-    for _ in range(6):
-        assert repair(graph, bounds, state) == DONE
-        if state.rhs[start] < math.inf:
-            stored, looks = stored_path(state)
-            steep, edges = gradient_path(graph, state)
-            assert path_cost(graph, stored.tolist()) == pytest.approx(path_cost(graph, steep.tolist()), rel=1e-12)
-            assert looks == len(stored)
-            assert edges == sum(graph.out_first[u + 1] - graph.out_first[u] for u in steep[:-1])
-        change_stored(graph, bounds, state, made.edit()[:], made.count, np.empty(made.count, np.int64))
-
-
-def behind(state, goal, cut_edges):
-    """Nodes whose stored ways lead over one of these edges, by following each."""
-    found = set()
-    for node in np.flatnonzero(state.best >= 0).tolist():
-        at = node
-        while at != goal:
-            successor = int(state.best[at])
-            if (at, successor) in cut_edges:
-                found.add(node)
-                break
-            at = successor
-    return found
-
-
-@pytest.mark.parametrize("seed", range(30))
-def test_what_rises_cuts_off_the_branch_behind_it_and_nothing_else(seed):
-    rng = random.Random(seed)
-    made = RandomGraph(rng, parallel=False)
-    graph, bounds, start = made.graph(), made.bounds(), rng.randrange(made.count)
-    state, room = new_lifelong(graph, start, made.goal, stores=True), np.empty(made.count, np.int64)
-    assert best_first(graph, bounds, state) == DONE
-    mark_stored(state)
-    for _ in range(6):
-        before, edited = state.g.copy(), made.edit()
-        rises = edited.costs > graph.cost[edited.edges]
-        ends = {(int(graph.tail[e]), int(graph.head[e])) for e in edited.edges[rises]}
-        cut = behind(state, made.goal, ends)
-        assert change_stored(graph, bounds, state, edited[:], made.count, room) == len(cut)
-        assert set(room[: len(cut)].tolist()) == cut
-        kept = [node for node in range(made.count) if node not in cut]
-        assert (state.g[kept] == before[kept]).all()
-        assert not np.isfinite(state.g[list(cut)]).any()
-        for node in cut:  # the best of the successors that are left
-            ways = [graph.cost[e] + state.g[graph.head[e]] for e in range(len(graph.cost)) if graph.tail[e] == node]
-            assert state.rhs[node] == min(ways, default=np.inf)
-        assert repair(graph, bounds, state) == DONE
-        wanted = dijkstra(graph, made.goal)
-        assert state.rhs[start] == pytest.approx(wanted.get(start, math.inf), rel=1e-9)
-
-
-def test_a_branch_that_is_too_large_is_left_and_told():
-    graph = digraph(5, [1, 2, 3, 4], [0, 1, 2, 3], [1.0, 1.0, 1.0, 1.0])
-    room = np.empty(5, np.int64)
-    for most, wanted in ((4, 4), (3, TOO_MANY), (0, TOO_MANY)):
-        graph.cost[:] = 1.0
-        state = new_lifelong(graph, 4, 0, stores=True)
-        assert best_first(graph, Bounds.none(5), state) == DONE
-        mark_stored(state)
-        changed = (np.array([0]), np.array([2.0]))
-        assert change_stored(graph, Bounds.none(5), state, changed, most, room) == wanted
-        assert graph.cost[0] == 2.0  # told in either case
-
-
-class Walk:
-    """A robot on a grid that sees only its eight neighbours' cells, and learns of obstacles on its way."""
-
-    def __init__(self, seed, size=16, share=0.3):
-        rng = random.Random(seed)
-        self.size = size
-        self.blocked = np.array([rng.random() < share for _ in range(size * size)])
-        self.blocked[[0, size * size - 1]] = False
-        cells = [(x, y) for y in range(size) for x in range(size)]
-        ends = [
-            (y * size + x, (y + j) * size + x + i)
-            for x, y in cells
-            for i in (-1, 0, 1)
-            for j in (-1, 0, 1)
-            if (i or j) and 0 <= x + i < size and 0 <= y + j < size
-        ]
-        self.tail, self.head = np.array(ends).T
-        length = np.hypot(self.tail % size - self.head % size, self.tail // size - self.head // size)
-        self.graph = digraph(size * size, self.tail, self.head, length)
-        self.bounds = Bounds(np.empty((0, size * size)), np.array(cells, np.float64))
-
-    def seen(self, node):
-        x, y = node % self.size, node // self.size
-        near = (abs(self.head % self.size - x) <= 1) & (abs(self.head // self.size - y) <= 1)
-        return np.flatnonzero(near & self.blocked[self.head] & (self.graph.cost < np.inf))
-
-    def run(self, *, stores, keep_modifier):
-        """Walk until the goal is reached or known to be out of reach; return replans and wrong distances."""
-        goal = self.size**2 - 1
-        state = new_lifelong(self.graph, 0, goal, stores=stores)
-        at, replans, wrong = 0, 0, 0
-        for _ in range(6 * self.size**2):
-            if at == goal:
-                break
-            edges = self.seen(at)
-            state.ends[0] = at
-            raised = edges, np.full(len(edges), np.inf)
-            if stores:
-                change_stored(self.graph, self.bounds, state, raised, self.size**2, np.empty(self.size**2, np.int64))
-            else:
-                change(self.graph, self.bounds, state, *raised)
-            if not keep_modifier:
-                state.key_modifier[0] = 0.0
-            repair(self.graph, self.bounds, state)
-            replans += 1
-            wanted = dijkstra(self.graph, goal).get(at, math.inf)
-            wrong += not math.isclose(min(state.rhs[at], 1e9), min(wanted, 1e9), rel_tol=1e-9)
-            path, _ = stored_path(state) if stores else gradient_path(self.graph, state)
-            if len(path) < 2:
-                break
-            at = int(path[1])
-        return replans, wrong
 
 
 @pytest.mark.parametrize("stores", [True, False])
@@ -343,40 +152,6 @@ def test_a_flood_tells_whether_there_is_a_way_and_a_search_after_it_which(sized)
         assert answer.cost == pytest.approx(wanted), seed
         lost += wanted == math.inf and answer.work.expanded == SOON
     assert lost > sized(10, 100)  # told by the flood
-
-
-class Doors:
-    """A grid of some hundred nodes; whole columns are closed and opened, so that the way is lost and found again."""
-
-    def __init__(self, seed):
-        self.rng, self.size = random.Random(seed), random.Random(seed).randrange(14, 22)
-        walk = Walk(seed, self.size, share=0.0)
-        self.tail, self.head, self.floor = walk.tail, walk.head, walk.graph.cost.copy()
-        self.graph = walk.graph
-        self.start = self.rng.randrange(self.size) * self.size + self.rng.randrange(4)
-        self.goal = self.rng.randrange(self.size) * self.size + self.rng.randrange(self.size - 4, self.size)
-
-    def edges_at(self, nodes):
-        return np.flatnonzero(np.isin(self.tail, nodes) | np.isin(self.head, nodes))
-
-    def column(self, gaps):
-        """Edges at a column but for some of its nodes."""
-        column = self.rng.randrange(5, self.size - 5)
-        rows = [row for row in range(self.size) if row not in gaps]
-        return self.edges_at(np.array(rows) * self.size + column)
-
-    def change(self):
-        """A wall appears, with a gap or without; part of what is closed opens; or most ways are cut near the goal."""
-        rng, cost = self.rng, self.graph.cost
-        closed, kind = np.flatnonzero(cost == np.inf), rng.random()
-        if len(closed) and kind < 0.45:
-            part = closed if rng.random() < 0.5 else np.array(rng.sample(closed.tolist(), 1 + len(closed) // 2))
-            return Changes(part, self.floor[part])
-        if kind < 0.75:
-            edges = self.column(set(rng.sample(range(self.size), rng.randrange(3))))
-            return Changes(edges, np.full(len(edges), np.inf))
-        edges = self.edges_at(np.array([self.goal]))
-        return Changes(edges, self.floor[edges] * rng.choice([1.0, 1.5, 3.0]))
 
 
 def test_what_is_closed_and_opened_between_answers_is_no_lost_way(sized):
@@ -526,39 +301,6 @@ def test_several_rises_before_anybody_asks_and_a_fall_after_them(sized):
                 assert answer.cost == pytest.approx(wanted, rel=1e-9), seed
                 if wanted < math.inf:
                     assert path_cost(graph, answer.nodes.tolist()) == pytest.approx(wanted, rel=1e-9), seed
-
-
-def test_bounds_never_exceed_distances_and_fall_short_of_them_by_no_edge_s_worth():
-    rng = random.Random(9)
-    for _ in range(30):
-        made = RandomGraph(rng)
-        graph, bounds = made.graph(), made.bounds()
-        for node in range(made.count):
-            distance = dijkstra(graph, node)
-            for start in range(made.count):
-                assert bound(bounds, start, node) <= distance.get(start, math.inf)
-        landmark = Bounds(landmarks(graph, np.array([made.goal])), np.empty((made.count, 0)))
-        for start, value in dijkstra(graph, made.goal).items():
-            assert bound(landmark, start, made.goal) == pytest.approx(BELOW_ONE * value)
-
-
-def test_the_heap_is_a_sorted_list():
-    rng = random.Random(4)
-    heap, plain = new_heap(50), {}
-    for _ in range(3000):
-        node = rng.randrange(50)
-        if rng.random() < 0.3:
-            take_out(heap, node)
-            plain.pop(node, None)
-        else:
-            key = (float(rng.randrange(8)), float(rng.randrange(8)))
-            put(heap, node, *key)
-            plain[node] = key
-        assert heap.size[0] == len(plain)
-        if plain:
-            top = int(heap.nodes[0])
-            assert plain[top] == min(plain.values())
-        assert {int(n) for n in heap.nodes[: heap.size[0]]} == set(plain)
 
 
 def test_an_unreachable_start_has_no_path_and_no_cost():

@@ -45,10 +45,10 @@ def _words(folder: Path) -> list[str]:
 
 
 def _command(words: list[str]) -> str:
-    """A command line without the interpreter's path and short enough for a sentence."""
+    """A command line without the interpreter's path, on one line and short enough for a sentence."""
     if not words:
         return "unnamed"
-    text = " ".join([Path(words[0]).name, *words[1:]])
+    text = " ".join(" ".join([Path(words[0]).name, *words[1:]]).split())
     return text if len(text) <= 80 else text[:77] + "..."
 
 
