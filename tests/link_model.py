@@ -41,6 +41,7 @@ from planarm_wire.messages import (
     Resume,
     Segment,
     Segments,
+    SoftLimits,
     Start,
     State,
     Status,
@@ -122,6 +123,7 @@ class Device:
         self.used_bytes = 0
         self.heads: list[tuple[int, int, int]] = []
         self.configs: list[Config] = []
+        self.soft_limits: SoftLimits | None = None
         self.holds = 0
         self.held_s = 0.0
         self.override_percent = 100
@@ -205,6 +207,8 @@ class Device:
                 return self._append(message)
             case Config() if self.state is State.IDLE:
                 self.configs.append(message)
+            case SoftLimits() if self.state in (State.IDLE, State.READY):
+                self.soft_limits = message
             case Resume():
                 if self.state is State.HELD:
                     self.state = State.RUNNING

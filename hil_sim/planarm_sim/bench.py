@@ -126,12 +126,14 @@ class Bench:
         drivers: one for each motor.
         step_cycles: the plant's step, see `Plant`.
         propped: somebody holds the arm where it stands, until all drivers are on for the first time.
+        stop_pin: on the board, where a normally closed stop contact pulls it to ground; None: there is none.
 
     Attributes:
         uno: the board.
         plant: the arm.
         drivers: the drivers.
         serial: the host's end of the serial line; faults put another in its place.
+        stop_pin: where the stop contact is wired.
         fault_log: what a schedule of faults did, one line each.
     """
 
@@ -145,12 +147,14 @@ class Bench:
         *,
         step_cycles: int | None = None,
         propped: bool = False,
+        stop_pin: str | None = None,
     ) -> None:
         if len(drivers) != len(rig.motors):
             raise UsageError(
                 f"the rig has {len(rig.motors)} motors, {len(drivers)} drivers are given; give one for each"
             )
         self.uno = uno
+        self.stop_pin = stop_pin
         self.serial = uno.serial
         self.fault_log: list[str] = []
         self.plant = Plant(rig, uno.cycle, step_cycles=step_cycles, propped=propped)
@@ -168,8 +172,10 @@ class Bench:
         states = self.drivers.states
         self.plant.take(np.array([[uno.cycle, m, phase, on] for m, (phase, on) in enumerate(states.tolist())]))
         uno.listen(self._hear)
+        if stop_pin is not None:
+            uno.pin(stop_pin).drive(0)
         for k in range(len(rig.switches)):
-            self._drive_switch(k, self.plant.pressed[k])
+            self._show_switch(k, self.plant.pressed[k])
 
     @property
     def cycle(self) -> int:
@@ -265,13 +271,23 @@ class Bench:
         """Let a limit switch stick or bounce from now on; None: it works again."""
         if state is None:
             self._forced.pop(switch, None)
-            self._drive_switch(switch, self.plant.pressed[switch])
+            self._show_switch(switch, self.plant.pressed[switch])
             return
         self._forced[switch] = state
         if state == "bouncing":
             self._chatter(switch, True)
         else:
             self._drive_switch(switch, state == "stuck_closed")
+
+    def press_stop(self, pressed: bool) -> None:
+        """Open the stop contact, or close it again.
+
+        Raises:
+            UsageError: there is none.
+        """
+        if self.stop_pin is None:
+            raise UsageError("the bench has no stop contact; give it a stop_pin")
+        self.uno.pin(self.stop_pin).drive(int(pressed))
 
     def report(self) -> BenchReport:
         """What happened so far."""
@@ -316,10 +332,10 @@ class Bench:
             if change.switch in self._forced:
                 continue
             bounces = int(self.plant.rig.switches[change.switch].bounce_s * CLOCK_HZ / BOUNCE_CYCLES)
-            self._drive_switch(change.switch, change.pressed)
+            self._show_switch(change.switch, change.pressed)
             for n in range(1, 2 * (bounces // 2) + 1):
                 level = change.pressed if n % 2 == 0 else not change.pressed
-                self.at(self.uno.cycle + n * BOUNCE_CYCLES, partial(self._drive_unless_forced, change.switch, level))
+                self.at(self.uno.cycle + n * BOUNCE_CYCLES, partial(self._show_unless_forced, change.switch, level))
 
     def _chatter(self, switch: int, closed: bool) -> None:
         """Open and close a bouncing switch until it works again."""
@@ -327,9 +343,12 @@ class Bench:
             self._drive_switch(switch, closed)
             self.at(self.uno.cycle + CHATTER_CYCLES, partial(self._chatter, switch, not closed))
 
-    def _drive_unless_forced(self, switch: int, closed: bool) -> None:
+    def _show_unless_forced(self, switch: int, pressed: bool) -> None:
         if switch not in self._forced:
-            self._drive_switch(switch, closed)
+            self._show_switch(switch, pressed)
+
+    def _show_switch(self, switch: int, pressed: bool) -> None:
+        self._drive_switch(switch, pressed != self.plant.rig.switches[switch].normally_closed)
 
     def _drive_switch(self, switch: int, closed: bool) -> None:
         pin = self.uno.pin(self.plant.rig.switches[switch].pin)

@@ -44,7 +44,7 @@ from planarm.stepping.certify import certify
 from planarm.stepping.schedule import encode, schedule
 from planarm.streaming.carry_out import carry_out
 from planarm.streaming.onlooker import Onlooker
-from planarm.streaming.plan_stream import record, warn_of_release
+from planarm.streaming.plan_stream import record, warn_before
 from planarm.streaming.standing import settle_start
 from planarm.trajectory.binding import report_timing
 from planarm.trajectory.limits import Limits
@@ -186,7 +186,7 @@ def run_scene(
         positions = Positions(default_path())
         settle_start(recorded, port, scene, plan.segments.start_usteps, positions, vouched=at_start)
         if warn is not None:
-            warn_of_release(scene, plan.segments, warn)
+            warn_before(scene, plan.segments, warn)
         log, plan_again = StreamLog(), partial(plan_scene, notice=notice)
         watchers, steer = [log.note, *([watch] if watch else [])], None
         if onlooker is not None:

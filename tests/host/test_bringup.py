@@ -20,7 +20,7 @@ from planarm.model.kinematics import forward
 from planarm.model.transmission import Transmission
 from planarm.notice import silent
 from planarm.pipeline import plan_scene
-from planarm.scene import parse_scene
+from planarm.scene import BoardSpec, parse_scene
 from planarm_wire.wirings import OWN, board_of, wirings
 
 ARM = ArmAnswers("test arm", (20.0, 15.0))
@@ -190,6 +190,14 @@ def test_the_dialogue_makes_a_scene_of_any_arm_that_a_board_moves(lengths, wirin
     if wiring == OWN and len(lengths) < 4:  # the others are as these, and take longer
         plan = plan_scene(scene, silent)
         assert plan.certificate.ok, plan.certificate.explain()
+
+
+def test_polarity_and_stop_contact_are_asked_for_and_stand_in_the_scene():
+    person = Scripted([("Lengths", "20 15"), ("while ENABLE (D8) is high", "yes"), ("stop contact", "yes")])
+    arm = ask_arm(person, "mine", "sim://")
+    assert person.answers == []
+    assert arm.scene().board_spec == BoardSpec(stop_input=True, enable_active_high=True)
+    assert ask_arm(Scripted([]), "mine", "sim://").scene().board_spec == BoardSpec()
 
 
 def test_an_arm_of_five_links_is_asked_for_again():

@@ -1,13 +1,15 @@
 """Which arms fall when their drivers are released, and that a run says so."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from host_scenes import least_scene
 from planarm.dynamics.release import falls_on_release, held_without_current_nm
-from planarm.scene import parse_scene
+from planarm.scene import BoardSpec, LimitSwitchSpec, parse_scene
 from planarm.stepping.plan import SegmentPlan
-from planarm.streaming.plan_stream import warn_of_release
+from planarm.streaming.plan_stream import LOOKED_AT_RAD, poses_along, warn_of_release, warn_of_switches
 from planarm_wire.messages import Move, Segment
 
 LEVEL, UPRIGHT = np.array([0.0, 0.0]), np.array([np.pi / 2, 0.0])
@@ -66,3 +68,45 @@ def test_a_plan_that_ends_level_is_warned_about():
     rests = SegmentPlan((), 0, (quarter, 0))
     warn_of_release(scene, rests, told.append)
     assert len(told) == 1
+
+
+def test_a_plan_that_falls_only_on_its_way_is_warned_about_with_the_worst_pose():
+    """Both ends stand or hang upright; half way the arm is level."""
+    scene = scene_with(HEAVY)
+    half = round(scene.joints[0].usteps_per_rad * np.pi)
+    over = SegmentPlan(
+        (Segment(2 * 10_000_000 + 1, (Move(2 * half, 0, 1 << 18), Move(0))),), 10_000_000, (half // 2, 0)
+    )
+    told: list[str] = []
+    warn_of_release(scene, over, told.append)
+    (text,) = told
+    angle = float(text.split("at [")[1].split(",")[0])
+    assert abs(angle) <= np.degrees(LOOKED_AT_RAD)
+    idle = replace(scene, board_spec=BoardSpec(idle_release_s=60.0))
+    warn_of_release(idle, over, told.append)
+    assert told[1].endswith("; board.idle_release_s releases them 60 s after the motion")
+
+
+def test_poses_along_a_plan_hold_its_ends_and_leave_no_gap():
+    scene = scene_with(HEAVY)
+    turns = round(scene.joints[0].usteps_per_rad)
+    segments = tuple(
+        Segment(20_000_000, (Move(2 * turns + 1, 0, 1 << 18), Move(2 * turns, 0, 1 << 18))) for _ in range(2)
+    )
+    q_rad = poses_along(scene, SegmentPlan(segments, 20_000_000, (7, 0)))
+    zero = 7 / scene.joints[0].usteps_per_rad
+    assert q_rad[0] == pytest.approx([zero, 0.0])
+    assert q_rad[-1] == pytest.approx([zero + 2.0, -2.0], abs=1e-2)
+    assert np.abs(np.diff(q_rad, axis=0)).max() <= LOOKED_AT_RAD + 1e-9
+    assert poses_along(scene, SegmentPlan((), 0, (7, 0))) == pytest.approx(np.array([[zero, 0.0]]))
+
+
+@pytest.mark.parametrize(("above", "at", "warned"), [(True, 0.5, True), (True, -0.1, False), (True, 1.5, False)])
+def test_a_plan_that_presses_a_switch_is_warned_about_and_one_that_leaves_it_is_not(above, at, warned):
+    scene = replace(scene_with(HEAVY), limit_switches=(LimitSwitchSpec(1, "A1", at, above, 0.0),))
+    turn = round(scene.joints[0].usteps_per_rad)
+    plan = SegmentPlan((Segment(20_000_000 + 1, (Move(2 * turn + 1, 0, 1 << 18), Move(0))),), 10_000_000, (0, 0))
+    told: list[str] = []
+    warn_of_switches(scene, plan, told.append)
+    assert bool(told) == warned
+    assert all("joint 1 presses its limit switch on the way, at 57.3 degrees" in text for text in told)

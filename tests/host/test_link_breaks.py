@@ -10,8 +10,10 @@ from planarm.link.exchange import open_session, request, stream_plan
 from planarm.link.plan_steps import planned_usteps
 from planarm.link.position import Certainty, StreamError, StreamFault
 from planarm.link.stream import StreamOptions
+from planarm.link.stream_values import plain_config
 from planarm_wire.codec import decode
 from planarm_wire.messages import (
+    BOARDS,
     Fault,
     MessageType,
     Query,
@@ -84,8 +86,9 @@ def test_a_hold_that_nobody_asked_for_is_taken_back():
 def test_messages_carry_the_least_allowances_of_their_segments():
     line, plan = ModelLine(), motion(60)
     allowances = tuple(Allowance(2.0 + k % 7, 1.0 + k % 5, 32_768.0 * (k % 9)) for k in range(60))
-    stream_plan(line, plan, options=StreamOptions(allowances=allowances, start_stop_ticks=(40_000, 50_000)))
-    assert [config.start_stop_ticks for config in line.device.configs] == [(40_000, 50_000)]
+    config = replace(plain_config(BOARDS["uno"]), start_stop_ticks=(40_000, 50_000))
+    stream_plan(line, plan, options=StreamOptions(allowances=allowances, config=config))
+    assert line.device.configs == [config]
     sent = [decode(f.type_code, f.payload) for f in frames_written(line) if f.type_code == MessageType.SEGMENTS]
     at = 0
     for message in sent:

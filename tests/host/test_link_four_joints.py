@@ -7,6 +7,7 @@ from planarm.link.exchange import stream_plan
 from planarm.link.released_image import released_image
 from planarm.link.sim_transport import SimTransport
 from planarm.link.stream import StreamOptions
+from planarm.link.stream_values import plain_config
 from planarm.stepping.segments import compress, expand
 from planarm.stepping.train import JointSteps, StepTrain
 from planarm_wire.errors import WireError
@@ -28,7 +29,7 @@ def test_an_arm_with_more_joints_streams_to_the_board_that_has_them(joints):
     assert {len(segment.moves) for segment in plan.segments} == {board.joints} == {4}
     made = expand(plan)
     transport = SimTransport(released_image(board.name))
-    result = stream_plan(transport, plan.segments, None, StreamOptions(start_stop_ticks=(160_000,) * joints))
+    result = stream_plan(transport, plan.segments, None, StreamOptions(config=plain_config(board)))
     moved = [200 if joint % 2 else -200 for joint in range(joints)]
     assert list(result.ledger_after.position_usteps) == [*moved, *[0] * (4 - joints)]
     rises = []

@@ -6,12 +6,11 @@ import numpy as np
 import pytest
 
 from planarm.link.exchange import stream_plan
-from planarm.link.stream import StreamOptions
 from planarm.link.transport import open_transport
 from planarm.pipeline import plan_scene
 from planarm.scene import load_scene
 from planarm.stepping.expand import expand
-from planarm.stepping.windows import start_stop_ticks
+from planarm.streaming.plan_stream import options_for
 from planarm_wire.messages import STEP_PINS, TICKS_HZ, State
 
 SCENE = Path(__file__).resolve().parents[2] / "examples/fast_arm.toml"
@@ -61,11 +60,7 @@ def test_the_line_has_room(plan):
 def test_it_streams_without_starving_and_every_step_is_on_its_tick(plan):
     line = open_transport("sim://", plan.scene.link.baud)
     told = []
-    options = StreamOptions(
-        allowances=plan.segments.allowances,
-        start_stop_ticks=tuple(start_stop_ticks(axis) for axis in plan.scene.joints),
-    )
-    result = stream_plan(line, plan.segments.segments, told.append, options)
+    result = stream_plan(line, plan.segments.segments, told.append, options_for(plan.scene, plan.segments))
     running = [one for one in told if one.state is not State.READY]
     assert result.path_clock_percent == 100
     assert {one.state for one in running} == {State.RUNNING}

@@ -2,6 +2,7 @@
 
 import tomllib
 from contextlib import closing
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,8 +13,8 @@ from planarm.link.arm_record import ArmSetup
 from planarm.link.transport import open_transport
 from planarm.pipeline import plan_scene
 from planarm.record.look import judge_emulated_arm, judge_pins
-from planarm.scene import load_scene
-from planarm.streaming.plan_stream import stream
+from planarm.scene import BoardSpec, load_scene
+from planarm.streaming.plan_stream import options_for, stream
 from planarm_sim.faults import KINDS, load_schedule
 
 FOLDER = Path(__file__).resolve().parents[1] / "scenarios"
@@ -23,7 +24,8 @@ REST_RAD = 1e-4
 
 @pytest.fixture(scope="module")
 def plan():
-    return plan_scene(load_scene(FOLDER / "arm.toml"), lambda _stage, _share: None)
+    scene = replace(load_scene(FOLDER / "arm.toml"), board_spec=BoardSpec(stop_input=True))
+    return plan_scene(scene, lambda _stage, _share: None)
 
 
 class Outcome:
@@ -35,14 +37,15 @@ class Outcome:
             open_transport("sim://", 250_000, ArmSetup(plan.scene, plan.segments.start_usteps, faults))
         ) as line:
             try:
-                result = stream(plan.segments, plan.certificate, line, None)
+                how = options_for(plan.scene, plan.segments)
+                result = stream(plan.segments, plan.certificate, line, None, how)
                 self.retransmissions = result.retransmissions
             except (LinkError, DeviceFault, HostKilledError) as error:
                 names = {LinkError: "link", DeviceFault: "fault", HostKilledError: "killed"}
                 self.kind = next(name for kind, name in names.items() if isinstance(error, kind))
                 self.position = getattr(error, "position", None)
             line.arm.settle(1.0)
-            self.switch_pin = line.uno.pin("A0").level
+            self.switch_pin = line.uno.pin("A1").level
             self.arm = judge_emulated_arm(plan, judge_pins(plan.segments, line.pins), line.arm)
         if self.kind == "done" and not self.arm.clean:
             self.kind = "arm"

@@ -29,10 +29,11 @@ class DriverWiring:
         row: the driver.
         step: pin on the board that STEP is wired to; so are the others.
         direction: DIR.
-        enable: ENABLE, active low; None: strapped so that current flows.
+        enable: ENABLE; None: strapped so that current flows.
         sleep: SLEEP, active low; None: strapped high.
         mode_pins: micro-step pins, as many as the row's modes have; empty: strapped, or switches, to `microsteps`.
         microsteps: resolution when the mode pins are not wired.
+        enable_active_high: current flows where ENABLE is high, as behind an inverting input.
     """
 
     row: DriverRow
@@ -42,6 +43,7 @@ class DriverWiring:
     sleep: str | None = None
     mode_pins: tuple[str, ...] = ()
     microsteps: int = 16
+    enable_active_high: bool = False
 
     def __post_init__(self) -> None:
         if not self.mode_pins and self.microsteps not in self.row.microsteps:
@@ -133,7 +135,8 @@ class DriverBank:
         level = [levels[pin] if pin >= 0 else None for pin in self._pins[d].tolist()]
         state[[judge.ROSE, judge.FELL, judge.TURNED, judge.ENABLED_AT, judge.MODE_AT, judge.AWAKE_AT]] = judge.NEVER
         state[judge.STEP], state[judge.DIR] = level[judge.IN_STEP] or 0, level[judge.IN_DIR] or 0
-        state[judge.ENABLED] = level[judge.IN_ENABLE] in (None, 0)
+        self._limits[d, judge.ENABLE_ON] = float(wiring.enable_active_high)
+        state[judge.ENABLED] = level[judge.IN_ENABLE] in (None, int(wiring.enable_active_high))
         state[judge.AWAKE] = level[judge.IN_SLEEP] in (None, 1)
         state[judge.MODE_BITS] = sum((bit or 0) << k for k, bit in enumerate(level[judge.IN_MODE :]))
         state[judge.SIZE] = state[judge.OLD_SIZE] = self._sizes[d, state[judge.MODE_BITS]]

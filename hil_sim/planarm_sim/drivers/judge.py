@@ -52,8 +52,8 @@ STATE_COLUMNS = 21
 """WANTED is what the pulses asked for, COUNTED what the driver made of them, both in phase units since the start."""
 
 # Columns of a driver's limits, nanoseconds; negative: no such rule. The first eight are `planarm_wire.drivers.RULES`.
-HIGH, LOW, PERIOD, SETUP, HOLD, ENABLE, MODE, WAKE, COUNTS_DISABLED, HOME = range(10)
-LIMIT_COLUMNS = 10
+HIGH, LOW, PERIOD, SETUP, HOLD, ENABLE, MODE, WAKE, COUNTS_DISABLED, HOME, ENABLE_ON = range(11)
+LIMIT_COLUMNS = 11
 
 # Columns of what comes out.
 EVENT_COLUMNS = 4  # cycle, driver, phase, whether current flows
@@ -101,7 +101,7 @@ def judge_edges(
                     elif role == IN_DIR:
                         broken = on_dir(state[d], limits[d], d, cycle, level, violations, broken)
                     elif role == IN_ENABLE:
-                        made = on_enable(state[d], d, cycle, level == 0, events, made)
+                        made = on_enable(state[d], d, cycle, level == limits[d, ENABLE_ON], events, made)
                     elif role == IN_SLEEP:
                         made = on_awake(state[d], limits[d], d, cycle, level, events, made)
                     else:

@@ -73,6 +73,10 @@ class FaultRunner:
 
     def _require_places(self, fault: Fault) -> None:
         rig = self._bench.plant.rig
+        if fault.kind == "mechanics.stop_input" and self._bench.stop_pin is None:
+            raise FaultError(
+                f"{self.schedule.source}: {fault.kind}: the bench has no stop contact; a scene's is board.stop_input"
+            )
         for key, count, noun in (("joint", len(rig.motors), "joints"), ("switch", len(rig.switches), "limit switches")):
             number = fault.settings.get(key, 1)
             if key in fault.settings and number > count:
@@ -130,6 +134,7 @@ class FaultRunner:
                 lambda: plant.set_outside_torque(joint, settings["torque_nm"]),
                 lambda: plant.set_outside_torque(joint, 0.0),
             ),
+            "mechanics.stop_input": (lambda: bench.press_stop(True), lambda: bench.press_stop(False)),
             "mechanics.limit_switch": (
                 lambda: bench.force_switch(switch, settings["state"]),
                 lambda: bench.force_switch(switch, None),

@@ -65,6 +65,7 @@ KINDS: Mapping[str, Mapping[str, Setting]] = {
         "switch": _NUMBER,
         "state": Setting(str, choices=("stuck_open", "stuck_closed", "bouncing")),
     },
+    "mechanics.stop_input": {},
     "host.pause": {},
     "host.killed": {},
 }

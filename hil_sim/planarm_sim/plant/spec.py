@@ -143,10 +143,11 @@ class LimitSwitch:
 
     Attributes:
         joint: number from 0.
-        pin: on the board; low while pressed, else a resistor holds it high.
+        pin: on the board; low while the contact is closed, else a resistor holds it high.
         at_rad: joint angle from which on it is pressed.
         above: pressed at and beyond `at_rad` when True, at and below it when False.
         bounce_s: how long the contact chatters after each change.
+        normally_closed: the contact opens when it is pressed; else it closes.
     """
 
     joint: int
@@ -154,6 +155,7 @@ class LimitSwitch:
     at_rad: float
     above: bool = False
     bounce_s: float = 0.001
+    normally_closed: bool = False
 
 
 @dataclass(frozen=True, slots=True)

@@ -61,6 +61,8 @@ class ArmAnswers:
     port: str = "sim://"
     wiring: str = OWN
     """Of the drivers; a name of the wire's pin maps."""
+    enable_active_high: bool = False
+    stop_input: bool = False
 
     def __post_init__(self) -> None:
         if not self.joints:
@@ -140,6 +142,14 @@ def _torque_share(arm: ArmAnswers, number: int) -> float:
     return float(motor_torque_shares(scene, torques, rates, accelerations)[0, number])
 
 
+def _board_lines(arm: ArmAnswers) -> list[str]:
+    """Return the table of what is not as usual; nothing where all is."""
+    lines = [f'wiring = "{arm.wiring}"         # of the drivers (docs/wiring.md)'] * (arm.wiring != OWN)
+    lines += ["enable_active_high = true       # the drivers are on while ENABLE is high"] * arm.enable_active_high
+    lines += ["stop_input = true               # all pulses end when the stop contact opens"] * arm.stop_input
+    return ["", "[board]", *lines] if lines else []
+
+
 def scene_text(arm: ArmAnswers) -> str:
     """Return the scene file of an arm, with a comment where a person would ask why."""
     reach = sum(arm.link_lengths_cm)
@@ -153,7 +163,7 @@ def scene_text(arm: ArmAnswers) -> str:
         f"link_lengths_cm = {_list(arm.link_lengths_cm)}   # joint to joint; planarm calibrate measures them",
         f"link_width_cm = {arm.link_width_cm:g}             # obstacles keep half of it from the links' centre lines",
         f'elbow = "{arm.elbow}"               # "up": theta2 <= 0, "down": theta2 >= 0, "either"',
-        *(["", "[board]", f'wiring = "{arm.wiring}"         # of the drivers (docs/wiring.md)'] * (arm.wiring != OWN)),
+        *_board_lines(arm),
         "",
         "[workspace]                     # where the tip may be; obstacles go below as [[obstacles]]",
         f"x_cm = [{-reach:g}, {reach:g}]",

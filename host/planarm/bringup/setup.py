@@ -38,10 +38,26 @@ def ask_arm(person: Person, name: str, port: str) -> ArmAnswers:
         elbow = ask_until(person, "Elbow: up, down or either", "up", one_of(("up", "down", "either")))
     known = wirings(len(lengths))
     wiring = ask_until(person, f"Wiring of the drivers: {', '.join(known)}", OWN, one_of(known))
-    person.tell(wiring_words(board_of(len(lengths), wiring)))
+    board = board_of(len(lengths), wiring)
+    person.tell(wiring_words(board))
+    question = f"Are the drivers on while ENABLE ({board.enable_pin}) is high; most are while it is low"
+    active_high = ask_until(person, question, "no", one_of(YES)) == "yes"
+    question = f"Is a stop contact, closed while all is well, wired from {board.stop_pin} to ground"
+    stop_input = ask_until(person, question, "no", one_of(YES)) == "yes"
     gravity = ask_until(person, "Does the arm stand upright, so that gravity pulls at it", "no", one_of(YES)) == "yes"
     payload = ask_until(person, "Mass at the tip (kg)", "0", number(0.0, 100.0))
-    arm = ArmAnswers(name, lengths, width, elbow, gravity, payload, port=port, wiring=wiring)
+    arm = ArmAnswers(
+        name,
+        lengths,
+        width,
+        elbow,
+        gravity,
+        payload,
+        port=port,
+        wiring=wiring,
+        enable_active_high=active_high,
+        stop_input=stop_input,
+    )
     for joint in range(arm.links):
         arm = _ask_joint(person, arm, joint)
     return arm

@@ -20,12 +20,12 @@ from planarm.errors import SceneError
 from planarm.link.exchange import stream_plan
 from planarm.link.released_image import released_image
 from planarm.link.sim_transport import SimTransport
-from planarm.link.stream_values import StreamOptions
 from planarm.notice import silent
 from planarm.pipeline import plan_scene
 from planarm.scene import Scene
 from planarm.stepping.expand import expand
 from planarm.stepping.train import StepTrain
+from planarm.streaming.plan_stream import options_for
 from planarm_wire.boards import Board
 from planarm_wire.messages import TICKS_HZ
 
@@ -139,7 +139,7 @@ def record(scene: Scene) -> Recording:
     """Stream the scene's plan to the emulated board once, and keep what the host wrote and when."""
     plan = plan_scene(scene, silent)
     line = _Recorder(scene.board)
-    stream_plan(line, plan.segments.segments, options=StreamOptions(wiring=scene.wiring))
+    stream_plan(line, plan.segments.segments, options=options_for(scene, plan.segments))
     return Recording(expand(plan.segments), tuple(line.written), line.before)
 
 

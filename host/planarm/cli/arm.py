@@ -21,6 +21,12 @@ if TYPE_CHECKING:
     from planarm.scene import Scene
 
 
+NOT_KNOWN = (
+    "the board does not know where its arm stands: it was told nothing since it started, or was stopped in an emergency"
+    " since; the arm is moved without soft limits"
+)
+
+
 @dataclass(frozen=True, slots=True)
 class Reached:
     """An arm that a command can talk to."""
@@ -71,6 +77,6 @@ def tell_standing(as_json: bool, scene: Scene, usteps: tuple[int, ...], how: str
         print(json.dumps(told))
         return
     if how is None:
-        print("the board does not know where its arm stands: it was told nothing since it started")
+        print(NOT_KNOWN)
     for name, value in told.items():
         print(f"{name}: {value}")

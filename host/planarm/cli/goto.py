@@ -18,10 +18,10 @@ def execute(options: argparse.Namespace) -> int:
     from planarm.link.position import moved_usteps
     from planarm.operations.arm_moves import goto
     from planarm.streaming.plan_stream import telling
-    from planarm.streaming.standing import look
+    from planarm.streaming.standing import look_and_configure
 
     with progress(options.json) as notice, reached(options) as arm:
-        standing = look(arm.transport, arm.port, arm.scene, arm.positions)
+        standing = look_and_configure(arm.transport, arm.port, arm.scene, arm.positions)
         pose = pose_rad(arm.scene, options.deg) if options.deg else None
         target_cm = None if options.deg else (options.x_cm, options.y_cm)
         _, done = goto(arm.transport, arm.scene, standing, target_cm, telling(notice, notice.watch), pose)

@@ -6,6 +6,7 @@ import argparse
 from typing import TYPE_CHECKING, Any
 
 from planarm.cli.arm import reached, tell_standing
+from planarm.cli.progress import progress
 from planarm.errors import StepsDifferError
 
 if TYPE_CHECKING:
@@ -17,8 +18,8 @@ def execute(options: argparse.Namespace) -> int:
     from planarm.operations.homing import home, prove_steps
 
     act = prove_steps if options.prove else home
-    with reached(options) as arm:
-        homed = act(arm.transport, arm.port, arm.scene, arm.positions)
+    with progress(options.json) as notice, reached(options) as arm:
+        homed = act(arm.transport, arm.port, arm.scene, arm.positions, notice.warn)
     if options.prove and not options.json:
         _tell(homed)
     stands = homed.kept_usteps if options.prove else homed.usteps

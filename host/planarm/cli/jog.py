@@ -17,12 +17,12 @@ def execute(options: argparse.Namespace) -> int:
     from planarm.link.position import moved_usteps
     from planarm.operations.arm_moves import jog
     from planarm.streaming.plan_stream import telling
-    from planarm.streaming.standing import look
+    from planarm.streaming.standing import look_and_configure
 
     with progress(options.json) as notice, reached(options) as arm:
         if not 1 <= options.joint <= len(arm.scene.joints):
             raise UsageError(f"joint {options.joint}: the scene has joints 1 to {len(arm.scene.joints)}")
-        standing = look(arm.transport, arm.port, arm.scene, arm.positions)
+        standing = look_and_configure(arm.transport, arm.port, arm.scene, arm.positions)
         turn_rad = radians(options.degrees)
         _, done = jog(arm.transport, arm.scene, standing, options.joint - 1, turn_rad, telling(notice, notice.watch))
     moved = moved_usteps(done.ledger_before, done.ledger_after)[: len(standing.usteps)]

@@ -25,10 +25,12 @@ def execute(options: argparse.Namespace) -> int:
     from contextlib import closing
 
     from planarm.link.arm_record import ArmSetup
+    from planarm.link.positions import Positions, default_path
     from planarm.link.transport import open_transport, require_port
     from planarm.operations.arrivals import Listed, Watched
     from planarm.operations.replanning import first_plan, run_live
     from planarm.scene.arrivals import load_arrivals
+    from planarm.streaming.standing import prepare
     from planarm.warm_up import warm_up
 
     port = scene.link.port if options.port is None else options.port
@@ -39,8 +41,9 @@ def execute(options: argparse.Namespace) -> int:
         warm_up(on_roadmap=True, replanning=True)
         notice("kernels", 1.0)
         first = first_plan(scene, notice)
-        setup = ArmSetup(scene, first[1].segments.start_usteps)
-        with closing(open_transport(port, scene.link.baud, setup)) as transport:
+        start = first[1].segments.start_usteps
+        with closing(open_transport(port, scene.link.baud, ArmSetup(scene, start))) as transport:
+            prepare(transport, port, scene, Positions(default_path()), start)
             result = run_live(scene, transport, source, notice, perf_counter, first, warn=notice.warn)
     told = result.figures()
     if not options.json:

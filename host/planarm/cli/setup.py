@@ -78,15 +78,18 @@ def moving(scene: Scene, port: str, q_rad: tuple[float, ...]) -> Iterator[Mover]
 
     from planarm.bringup.nudge import Mover
     from planarm.link.arm_record import ArmSetup
+    from planarm.link.positions import Positions, default_path
     from planarm.link.transport import open_transport
     from planarm.model.transmission import Transmission
-    from planarm.streaming.plan_stream import stream
+    from planarm.streaming.plan_stream import options_for, stream
+    from planarm.streaming.standing import prepare
 
     usteps = np.floor(Transmission.of(scene).usteps(np.array(q_rad)) + 0.5)
     setup = ArmSetup(scene, tuple(int(n) for n in usteps))
     with closing(open_transport(port, scene.link.baud, setup)) as line:
+        prepare(line, port, scene, Positions(default_path()), setup.start_usteps)
 
         def carry_out(plan: SegmentPlan, certificate: Certificate) -> None:
-            stream(plan, certificate, line, None)
+            stream(plan, certificate, line, None, options_for(scene, plan, known=False))
 
         yield Mover(carry_out, q_rad)

@@ -23,7 +23,7 @@ def execute(options: argparse.Namespace) -> int:
     from planarm.run_folder.folder import begin_run_folder
     from planarm.scene import load_scene
     from planarm.scene.rebuild import scene_from_mapping
-    from planarm.streaming.plan_stream import options_for, record, stream, telling, warn_of_release
+    from planarm.streaming.plan_stream import options_for, record, stream, telling, warn_before
     from planarm.streaming.standing import settle_start
 
     plan = load_plan(Path(options.plan))
@@ -40,7 +40,7 @@ def execute(options: argparse.Namespace) -> int:
         positions = Positions(default_path())
         line = record(transport, out, port, scene)
         settle_start(line, port, scene, plan.segments.start_usteps, positions, vouched=options.at_start)
-        warn_of_release(scene, plan.segments, notice.warn)
+        warn_before(scene, plan.segments, notice.warn)
         watch, how = telling(notice, notice.watch), options_for(scene, plan.segments)
         result = stream(plan.segments, plan.certificate, line, watch, how, warn=notice.warn)
     moved = moved_usteps(result.ledger_before, result.ledger_after)[: len(scene.joints)]

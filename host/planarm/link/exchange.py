@@ -16,7 +16,7 @@ from planarm.link.pace import PERCENT
 from planarm.link.position import Known, Meeting, PositionReport, StreamError, StreamFault, judge
 from planarm.link.session import Session, SessionLimits, fault_words
 from planarm.link.stream import Joining, Phase, Stream, StreamOptions, StreamProgress
-from planarm.link.stream_values import config_of
+from planarm.link.stream_values import plain_config
 from planarm.link.transport import Transport
 from planarm_wire.boards import Board
 from planarm_wire.messages import Fault, HostMessage, Ledger, Query, Segment, State, Status
@@ -104,11 +104,10 @@ def stream_plan(
     except (LinkError, DeviceFault) as error:
         if stream.course.before is None:  # nothing was queued yet, so nothing moved
             raise
-        position, fault = _find_position(transport, session, stream)
+        position, latched = _find_position(transport, session, stream)
         if not isinstance(error, DeviceFault):
             raise StreamError(str(error), position) from error
-        cause = fault_words(fault) if fault is not Fault.NONE else str(error)  # a refusal may foretell a fault
-        raise StreamFault(cause, position) from error
+        raise StreamFault(latched or str(error), position) from error  # a refusal may foretell a fault
     if stream.stopped:
         raise StreamError("stopped as asked", _report(stream, session, _meeting(session)))
     return _result(session, transport.clock.now_s(), began_s, stream)
@@ -157,7 +156,7 @@ def open_on_board(transport: Transport, board: Board) -> tuple[Session, Status]:
     if status.state is State.IDLE:
         return session, status
     session.ask_wiring()
-    request(transport, session, config_of((), board))
+    request(transport, session, plain_config(board))
     session = open_session(transport)  # a refusal is told until the next HELLO
     session.require_board(board)
     return session, request(transport, session, Query())
@@ -216,19 +215,23 @@ def meet(transport: Transport, next_seq: int, limits: SessionLimits | None = Non
     return _meeting(session)
 
 
-def _find_position(transport: Transport, session: Session, stream: Stream) -> tuple[PositionReport, Fault]:
-    """Find out where the arm is after a motion broke off, and the fault that latched, if any.
+def _find_position(transport: Transport, session: Session, stream: Stream) -> tuple[PositionReport, str]:
+    """Find out where the arm is after a motion broke off, and the fault that latched, in words; "" where none did.
 
     The device is asked again, unless it has just told.
     """
     assert session.status is not None, "a motion begins with a status"
     if session.status.state is State.FAULT:
-        return _report(stream, session, _meeting(session)), session.status.fault
+        return _report(stream, session, _meeting(session)), _latched(session.status)
     try:
         met = meet(transport, session.next_seq, session.limits)
     except (LinkError, DeviceFault):
-        return _report(stream, session, None), Fault.NONE
-    return _report(stream, session, met), met.status.fault
+        return _report(stream, session, None), ""
+    return _report(stream, session, met), _latched(met.status)
+
+
+def _latched(status: Status) -> str:
+    return "" if status.fault is Fault.NONE else fault_words(status.fault, status.detail)
 
 
 def _meeting(session: Session) -> Meeting:

@@ -1,7 +1,8 @@
 """Which boots of which boards know where their arm stands. A board counts steps from where it was told to be.
 
 Its counters are lost at every restart, and then it counts from nothing. So whoever tells a position - zeroing, homing,
-a run that began at a known place - notes the board's boot here, and whoever needs it looks here.
+a run that began at a known place - notes the board's boot here, and whoever needs it looks here. So with CONFIG, which
+a board keeps as long.
 """
 
 import json
@@ -36,9 +37,29 @@ class Positions:
         Raises:
             OutputError: it cannot be written.
         """
+        self._note(port, boot_nonce, {"arm": arm, "how": how})
+
+    def note_config(self, port: str, boot_nonce: int, config: str) -> None:
+        """Note what CONFIG a boot was told, as the payload's hexadecimal digits.
+
+        Raises:
+            OutputError: it cannot be written.
+        """
+        self._note(port, boot_nonce, {"config": config})
+
+    def forget(self, port: str, boot_nonce: int) -> None:
+        """Note that a boot knows its position no more; what CONFIG it was told it keeps.
+
+        Raises:
+            OutputError: it cannot be written.
+        """
+        if "how" in self._read().get(_key(port, boot_nonce), {}):
+            self._note(port, boot_nonce, {"arm": "", "how": ""})
+
+    def _note(self, port: str, boot_nonce: int, told: dict[str, str]) -> None:
         notes = self._read()
-        notes.pop(_key(port, boot_nonce), None)
-        notes[_key(port, boot_nonce)] = {"arm": arm, "how": how}
+        before = notes.pop(_key(port, boot_nonce), {})
+        notes[_key(port, boot_nonce)] = before | told
         kept = dict(list(notes.items())[-MOST:])
         with writing(self.path):
             self.path.parent.mkdir(parents=True, exist_ok=True)
@@ -49,7 +70,11 @@ class Positions:
     def how(self, port: str, boot_nonce: int, arm: str) -> str | None:
         """By what a boot with this arm knows its position; None: it does not."""
         note = self._read().get(_key(port, boot_nonce))
-        return note["how"] if note is not None and note["arm"] == arm else None
+        return note.get("how") if note is not None and note.get("arm") == arm else None
+
+    def config(self, port: str, boot_nonce: int) -> str | None:
+        """What CONFIG a boot was told, as `note_config` was given it; None: nothing is noted."""
+        return self._read().get(_key(port, boot_nonce), {}).get("config")
 
     def _read(self) -> dict[str, dict[str, str]]:
         try:

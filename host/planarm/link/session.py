@@ -43,6 +43,8 @@ HELLO_LATER_PAUSE_S = 1.25
 
 _HELLO_SEQ = 0
 _MODULO_256 = 0xFF
+FAULTS_OF_A_JOINT = (Fault.LIMIT_SWITCH, Fault.SOFT_LIMIT, Fault.HOMING_FAILED)
+DETAIL_WORDS = "; detail tells the joint"
 _FLASH_IT = "flash the released image: planarm flash --port DEVICE"
 
 
@@ -318,7 +320,7 @@ class Session:
 
     def _raise_fault(self, status: Status) -> None:
         if self.guarded and status.fault != Fault.NONE:
-            raise DeviceFault(fault_words(status.fault))
+            raise DeviceFault(fault_words(status.fault, status.detail))
         if status.refusal != Result.OK:
             name = self._names.get(status.refusal_seq, "a frame")
             words = RESULT_WORDS[status.refusal]
@@ -329,6 +331,8 @@ class Session:
                     f"the device's image is not for the wiring {self._board.pin_map!r} of the plan:"
                     f" {_flash_for(self._board)}, or change board.wiring"
                 )
+            if status.refusal is Result.WRONG_STATE and status.fault is not Fault.NONE:
+                raise DeviceFault(fault_words(status.fault, status.detail))  # that is why
             raise DeviceFault(
                 f"the device refused {name} (frame {status.refusal_seq}, state {status.state.name.lower()}):"
                 f" {words.text}; {words.fix}"
@@ -362,10 +366,11 @@ def _flash_for(board: Board) -> str:
     return f"flash its image, planarm flash --board {board.name} --port DEVICE"
 
 
-def fault_words(fault: Fault) -> str:
-    """Return what to tell the user about a latched fault."""
+def fault_words(fault: Fault, detail: int) -> str:
+    """Return what to tell the user about a latched fault with its detail, which tells some faults' joint from 0."""
     words = FAULT_WORDS[fault]
-    return f"the device stopped: {words.text}; {words.fix}"
+    joint = f"joint {detail + 1}: " if fault in FAULTS_OF_A_JOINT else ""
+    return f"the device stopped: {joint}{words.text.removesuffix(DETAIL_WORDS)}; {words.fix}"
 
 
 def _decode(frame: Frame, joints: int = JOINTS) -> Message:

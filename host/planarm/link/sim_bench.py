@@ -71,7 +71,9 @@ def build_bench(uno: Uno, setup: ArmSetup) -> tuple[Bench, FaultRunner | None]:
 
     try:
         upright = setup.scene.mechanics.gravity  # a person holds such an arm until its drivers do
-        bench = Bench(uno, rig_of(setup.scene, setup.start_usteps), drivers_of(setup.scene), propped=upright)
+        stop_pin = setup.scene.board.stop_pin if setup.scene.board_spec.stop_input else None
+        rig, drivers = rig_of(setup.scene, setup.start_usteps), drivers_of(setup.scene)
+        bench = Bench(uno, rig, drivers, propped=upright, stop_pin=stop_pin)
     except SimError as error:
         raise EmulatorError(f"{setup.scene.source}: joints.driver, joints.microsteps: {error}") from error
     return bench, _let_loose(bench, setup.faults, setup.fault_seed)
@@ -154,7 +156,10 @@ def rig_of(scene: Scene, start_usteps: tuple[int, ...]) -> Rig:
         gravity_m_s2=GRAVITY_M_S2 if mechanics.gravity else 0.0,
         base_m=(CM * scene.arm.base_cm[0], CM * scene.arm.base_cm[1]),
         obstacles=tuple(_obstacle(obstacle) for obstacle in scene.obstacles if obstacle.motion is None),
-        switches=tuple(LimitSwitch(s.joint - 1, s.pin, s.at_rad, s.above, s.bounce_s) for s in scene.limit_switches),
+        switches=tuple(
+            LimitSwitch(s.joint - 1, s.pin, s.at_rad, s.above, s.bounce_s, s.normally_closed)
+            for s in scene.limit_switches
+        ),
     )
 
 
@@ -164,7 +169,14 @@ def drivers_of(scene: Scene) -> list[DriverWiring]:
 
     board = scene.board
     return [
-        DriverWiring(joint.driver_row, step, direction, board.enable_pin, microsteps=joint.microsteps)
+        DriverWiring(
+            joint.driver_row,
+            step,
+            direction,
+            board.enable_pin,
+            microsteps=joint.microsteps,
+            enable_active_high=scene.board_spec.enable_active_high,
+        )
         for joint, (step, direction) in zip(scene.joints, board.joint_pins, strict=False)
     ]
 

@@ -54,7 +54,8 @@ class SimTransport:
     """A line to an Uno emulated from a flash image; `pins` shows its edges, `uno` is the board itself.
 
     With a setup drivers, motors and an arm stand around it, and `arm` shows what they do. `usb` is "direct", or "16u2"
-    with the delays and limits of the board's USB bridge. `board` says how the image is wired.
+    with the delays and limits of the board's USB bridge. `board` says how the image is wired. Without a setup its stop
+    contact is closed.
     """
 
     def __init__(
@@ -77,6 +78,8 @@ class SimTransport:
         if setup is not None:
             self._machine, self._faults = build_bench(self.uno, setup)
             self.arm = SimArm(self._machine, self._faults)
+        else:
+            self.uno.pin(board.stop_pin).drive(0)  # a stop contact is closed while all is well
         self.clock: Clock = EmulatorClock(self._machine)
         self.pins = EmulatorPins(self.uno, board)
         self._received = bytearray()

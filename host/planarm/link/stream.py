@@ -12,6 +12,7 @@ says when it is done. A hold that nobody here asked for, as a damaged byte may c
 from bisect import bisect_left
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from math import ceil
 
 from planarm.errors import CertificateError, LinkError
 from planarm.link.clock_sync import Span
@@ -22,7 +23,7 @@ from planarm.link.plan_steps import LOOK_AHEAD
 from planarm.link.position import MissedStartError
 from planarm.link.progress import progress_of
 from planarm.link.session import Session
-from planarm.link.stream_values import AT_EASE, Joining, Phase, StreamOptions, StreamProgress, config_of
+from planarm.link.stream_values import AT_EASE, Joining, Phase, StreamOptions, StreamProgress, soft_limits_at
 from planarm_wire.codec import encoded_bytes
 from planarm_wire.messages import (
     HOLD_CODE,
@@ -45,7 +46,7 @@ from planarm_wire.rates import Allowance
 from planarm_wire.steps import duration_ticks
 from planarm_wire.wirings import board_of
 
-__all__ = ["AT_EASE", "PERCENT", "Joining", "Phase", "Stream", "StreamOptions", "StreamProgress", "config_of"]
+__all__ = ["AT_EASE", "PERCENT", "Joining", "Phase", "Stream", "StreamOptions", "StreamProgress"]
 
 MIN_POLL_S = 0.002  # a status and its question take 1.5 ms of the line
 MAX_POLL_S = 0.050  # keeps progress alive during long segments
@@ -78,6 +79,8 @@ class Stream:
         self.stopped = False
         self.unasked_holds = 0
         self._start_sent_s, self._lead_ticks_sent = 0.0, 0
+        self._awake_s = 0.0
+        self._warn = warn
         self._session = session
         self._options = options or StreamOptions()
         self._board = board_of(len(segments[0].moves), self._options.wiring)
@@ -231,8 +234,11 @@ class Stream:
     def _configure(self, now_s: float) -> None:
         if not self._session.idle:
             return
-        if self._status.state is State.IDLE and self._options.start_stop_ticks:
-            self._session.send(config_of(self._options.start_stop_ticks, self._board), now_s)
+        if self._status.state is State.IDLE and self._options.config is not None:
+            self._session.send(self._options.config, now_s)
+        limits = soft_limits_at(self._status.ledger, self._options, self._warn)
+        if limits is not None:
+            self._session.send(limits, now_s)
         self.phase = Phase.CONFIGURING
 
     def _enable(self, now_s: float) -> None:
@@ -247,6 +253,8 @@ class Stream:
             return
         if self._status.state is not State.READY:
             raise LinkError(f"the device took ENABLE but reports {self._status.state.name.lower()}; reset the board")
+        if self._options.config is not None:
+            self._awake_s = now_s + self._options.config.wake_ticks / TICKS_HZ
         self._session.guarded = True
         self.course.before = self._status.ledger
         self.pace.begin_filling(now_s)
@@ -263,13 +271,16 @@ class Stream:
             self.phase = Phase.STARTING
 
     def _lead_ticks(self, now_s: float) -> int:
-        """Return the time from START to the first segment."""
-        start_at_s, least = self._options.start_at_s, self._options.lead_ticks
+        """Return the time from START to the first segment, which the drivers are awake for."""
+        start_at_s, least = self._options.start_at_s, self._least_lead_ticks(now_s)
         left = least if start_at_s is None else round((start_at_s - now_s) * TICKS_HZ)
         if left < least:
             assert start_at_s is not None, "the least lead is never missed"
             raise MissedStartError(start_at_s, now_s, least / TICKS_HZ)
         return left
+
+    def _least_lead_ticks(self, now_s: float) -> int:
+        return max(self._options.lead_ticks, ceil((self._awake_s - now_s) * TICKS_HZ))
 
     def _begin_running(self, now_s: float) -> None:
         if self._session.idle:
@@ -414,7 +425,7 @@ class Stream:
         if self._status.state in AT_EASE or self._status.rate_percent < PERCENT:
             return float("inf")
         running = min(self.executed_segments, self.total_segments - 1)
-        ticks = duration_ticks(self.course.segments[running]) + self._options.lead_ticks
+        ticks = duration_ticks(self.course.segments[running]) + max(self._options.lead_ticks, self._lead_ticks_sent)
         return self.course.executed_s + ticks / TICKS_HZ + self._session.limits.silence_s
 
     def _stall_words(self, now_s: float) -> str:

@@ -1,6 +1,6 @@
 """What a stream is given and what it tells, as values."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from enum import Enum, auto
 
@@ -14,6 +14,7 @@ from planarm_wire.messages import (
     Ledger,
     PinMap,
     SetPosition,
+    SoftLimits,
     State,
 )
 from planarm_wire.rates import Allowance
@@ -29,19 +30,22 @@ class StreamOptions:
 
     `lead_ticks` lies between START and the first segment; the 10 ms cover a DM542's response to ENABLE, quoted as under
     5 ms. `release_when_done` lets go of the joints at the end: a loaded arm falls, so the drivers stay enabled unless
-    asked. `allowances`, one a segment, let the device slow down along the path; without them it cannot. The motors'
-    `start_stop_ticks` tell it from which interval on they may stop dead; a device whose drivers are enabled keeps what
-    it was told before. `released_spread_usteps` is how far each joint can move by itself while the drivers are
-    released; empty: any way. `start_at_s` is a time of the clock at which the first segment is due: START is given the
-    lead that is left until then, at least `lead_ticks`. `ahead_s` limits how much path the device is given beyond what
-    a stop takes, for motions whose rest may be changed on the way; without it the device's queue is filled. `wiring`
-    names the pin map of the board that the plan is for.
+    asked. `allowances`, one a segment, let the device slow down along the path; without them it cannot. `config` is
+    told to a device whose drivers are released; one whose drivers are enabled keeps what it was told before.
+    `soft_limits` are told in either case, where the device counts `start_usteps`, as the plan begins there: else its
+    count is not the arm's place, and it is told that there are none. `released_spread_usteps` is how far each joint can
+    move by itself while the drivers are released; empty: any way. `start_at_s` is a time of the clock at which the
+    first segment is due: START is given the lead that is left until then, at least `lead_ticks`. `ahead_s` limits how
+    much path the device is given beyond what a stop takes, for motions whose rest may be changed on the way; without it
+    the device's queue is filled. `wiring` names the pin map of the board that the plan is for.
     """
 
     lead_ticks: int = 160_000
     release_when_done: bool = False
     allowances: tuple[Allowance, ...] = ()
-    start_stop_ticks: tuple[int, ...] = ()
+    config: Config | None = None
+    soft_limits: SoftLimits | None = None
+    start_usteps: tuple[int, ...] = ()
     released_spread_usteps: tuple[int, ...] = ()
     start_at_s: float | None = None
     ahead_s: float | None = None
@@ -108,11 +112,31 @@ class Phase(Enum):
     DONE = auto()
 
 
-def config_of(start_stop_ticks: Sequence[int], board: Board) -> Config:
-    """Return what a board is told of its wiring and the motors' start-stop intervals; further joints rest."""
-    told = (*start_stop_ticks, *(DEFAULT_START_STOP_TICKS,) * (board.joints - len(start_stop_ticks)))
+def plain_config(board: Board) -> Config:
+    """Return what a board is told of its wiring where nothing else is known: the wire's defaults, no input used."""
+    start_stop_ticks = (DEFAULT_START_STOP_TICKS,) * board.joints
     pulses_ticks = board.min_step_high_ticks
-    return Config(PinMap[board.pin_map.upper()], board.joints, 0, 0, 0, DEFAULT_WAKE_TICKS, pulses_ticks, told)
+    pin_map = PinMap[board.pin_map.upper()]
+    return Config(pin_map, board.joints, 0, 0, 0, DEFAULT_WAKE_TICKS, pulses_ticks, start_stop_ticks)
+
+
+def no_soft_limits(board: Board) -> SoftLimits:
+    """Return what tells a board that its joints may be anywhere."""
+    return SoftLimits((0,) * board.joints, (-1,) * board.joints)
+
+
+def soft_limits_at(ledger: Ledger, options: StreamOptions, warn: Callable[[str], None] | None) -> SoftLimits | None:
+    """Return the soft limits that a device at such a count is told; None: it keeps what it was told before."""
+    limits, begins = options.soft_limits, options.start_usteps
+    if limits is None or ledger.position_usteps[: len(begins)] == begins:
+        return limits
+    if warn is not None:
+        counted = ledger.position_usteps[: len(begins)]
+        warn(
+            f"soft limits are not watched: the board counts {counted} usteps where the plan begins at {begins}, so its"
+            " count is not the arm's place; tell it with 'planarm home SCENE' or 'planarm zero SCENE'"
+        )
+    return SoftLimits((0,) * len(limits.least_usteps), (-1,) * len(limits.most_usteps))
 
 
 def position_of(usteps: Sequence[int], joints: int) -> SetPosition:

@@ -105,4 +105,5 @@ def jog(
     start_cm = pose_of(scene, standing.usteps)[1]
     here = replace(free, task=replace(scene.task, start_cm=start_cm, goal_cm=goal_cm))
     certificate = certify(here, trajectory, train, segments)
-    return segments, stream(segments, certificate, transport, on_progress, options_for(scene, segments))
+    options = options_for(scene, segments, known=known)
+    return segments, stream(segments, certificate, transport, on_progress, options)

@@ -8,7 +8,8 @@ two full steps, and what is left over is the switch's own play.
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass, replace
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
 
 import numpy as np
 
@@ -16,17 +17,19 @@ from planarm.errors import DeviceFault, LinkError, SceneError
 from planarm.link.exchange import open_on_board, request
 from planarm.link.positions import Positions
 from planarm.link.session import Session, fault_words
-from planarm.link.stream_values import config_of, position_of
+from planarm.link.stream_values import position_of
 from planarm.link.transport import Transport
-from planarm.model.transmission import Transmission, motor_axes
+from planarm.model.transmission import Transmission
 from planarm.plan_file import arm_hash
 from planarm.scene import JointSpec, LimitSwitchSpec, Scene
 from planarm.stepping.train import least_reversal_ticks
 from planarm.stepping.windows import start_stop_ticks
+from planarm.streaming.configure import configure, falls_anywhere
+from planarm.streaming.standing import known_by
 from planarm_wire.messages import DEBOUNCE_TICKS, Clear, Enable, Fault, Home, Query, State, Stop
 
-WATCH_SWITCHES = 1 << 3
-"""CONFIG's option: limit switches are watched."""
+Warn = Callable[[str], None]
+
 FIELD_FULL_STEPS = 4
 """A turn of the field: where a rotor that lost its step can fall in again."""
 HOMING_SLOWER = 4
@@ -93,21 +96,25 @@ class Homed:
         return tuple(touch.lost_usteps for touch in self.touched) if self.known_by == HOMED else None
 
 
-def home(transport: Transport, port: str, scene: Scene, positions: Positions) -> Homed:
+def home(transport: Transport, port: str, scene: Scene, positions: Positions, warn: Warn | None = None) -> Homed:
     """Move every joint to its limit switch, in the scene's order of switches, and take the position from there.
+
+    `warn` is told when the arm would fall once its drivers let go of it. Drivers that hold it are released only where
+    the board has other settings than the scene's, and the arm does not fall.
 
     Raises:
         SceneError: a joint has no switch, or motors move several joints.
         DeviceFault: a switch was not found; the drivers hold.
-        LinkError: the line failed.
+        LinkError: the line failed, or the board needs other settings and the arm would fall.
     """
     session, known_by = _meet(transport, port, scene, positions)
-    _make_ready(transport, session, scene)
+    _warn_of_release(scene, warn)
+    _make_ready(transport, session, port, scene, positions, known_by)
     homed = Homed(_touch_all(transport, session, scene), known_by)
     return _settle(transport, port, scene, positions, session, homed, homed.usteps)
 
 
-def prove_steps(transport: Transport, port: str, scene: Scene, positions: Positions) -> Homed:
+def prove_steps(transport: Transport, port: str, scene: Scene, positions: Positions, warn: Warn | None = None) -> Homed:
     """Touch every switch again and tell the steps lost since homing; the count is corrected by exactly those.
 
     Raises:
@@ -120,9 +127,17 @@ def prove_steps(transport: Transport, port: str, scene: Scene, positions: Positi
             f"nothing to compare with: the arm was not homed since the board's last start, its place is"
             f" {known_by or 'not known'}; 'planarm home SCENE' before the run, then ask again after it"
         )
-    _make_ready(transport, session, scene)
+    _warn_of_release(scene, warn)
+    _make_ready(transport, session, port, scene, positions, known_by)
     homed = Homed(_touch_all(transport, session, scene), known_by)
     return _settle(transport, port, scene, positions, session, homed, homed.kept_usteps)
+
+
+def _warn_of_release(scene: Scene, warn: Warn | None) -> None:
+    """Say so when the arm would fall anywhere between its limits: a switch that is not found releases the drivers."""
+    falling = falls_anywhere(scene)
+    if falling is not None and warn is not None:
+        warn(f"{falling}; homing that finds no switch releases them when that is cleared")
 
 
 def _meet(transport: Transport, port: str, scene: Scene, positions: Positions) -> tuple[Session, str | None]:
@@ -137,20 +152,19 @@ def _meet(transport: Transport, port: str, scene: Scene, positions: Positions) -
             if missing
             else "homing is for motors that each move one joint; tell the place: 'planarm zero SCENE'",
         )
-    session, _ = open_on_board(transport, scene.board)
-    assert session.welcome is not None, "an open session has a welcome"
-    return session, positions.how(port, session.welcome.boot_nonce, arm_hash(asdict(scene)))
+    session, status = open_on_board(transport, scene.board)
+    return session, known_by(session, status, port, scene, positions)
 
 
-def _make_ready(transport: Transport, session: Session, scene: Scene) -> None:
-    """Tell the device of its motors and switches, and switch its drivers on."""
+def _make_ready(
+    transport: Transport, session: Session, port: str, scene: Scene, positions: Positions, known_by: str | None
+) -> None:
+    """Tell the device of its motors and switches, unless it was told, and switch its drivers on."""
     status = request(transport, session, Query())
     if status.state is not State.IDLE:
         status = request(transport, session, Clear())
-    if status.state is State.READY:
-        request(transport, session, Enable(0))  # CONFIG is for released drivers
-    told = config_of([start_stop_ticks(axis) for axis in motor_axes(scene.joints, scene.coupling)], scene.board)
-    request(transport, session, replace(told, options=WATCH_SWITCHES))
+    known = status.ledger.position_usteps[: len(scene.joints)] if known_by is not None else None
+    configure(transport, session, port, scene, positions, known)
     request(transport, session, Enable(1))
 
 
@@ -220,6 +234,6 @@ def _wait_for_switch(transport: Transport, session: Session, switch: LimitSwitch
             raise LinkError(f"joint {switch.joint}: no switch within {HOMING_LIMIT_S:g} s; it was stopped")
         clock.wait_until(clock.now_s() + HOMING_POLL_S)
     if status.fault is not Fault.NONE:
-        raise DeviceFault(f"joint {switch.joint}: {fault_words(status.fault)}")
+        raise DeviceFault(fault_words(status.fault, status.detail))
     if status.holds != holds:
         raise LinkError(f"joint {switch.joint}: homing was broken off before its switch; start it again")

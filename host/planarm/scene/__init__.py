@@ -4,6 +4,7 @@ This is the only place where units are converted: the file speaks centimetres an
 centimetres and radians. docs/scene.md is the reference of the format.
 """
 
+from planarm.scene.board import BoardSpec
 from planarm.scene.dc_motors import DcMotorSpec
 from planarm.scene.joint import JointSpec
 from planarm.scene.joint_space import ElbowChoice, JointObjective, JointSpaceSpec
@@ -36,6 +37,7 @@ __all__ = [
     "ROADMAP_ALGORITHMS",
     "Algorithm",
     "ArmSpec",
+    "BoardSpec",
     "Corners",
     "DcMotorSpec",
     "EdgeCost",

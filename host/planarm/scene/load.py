@@ -6,7 +6,7 @@ from math import radians
 from pathlib import Path
 
 from planarm.errors import SceneError
-from planarm.scene.board import BOARD_KEYS, parse_board
+from planarm.scene.board import BOARD_KEYS, parse_board, parse_wiring, require_inputs
 from planarm.scene.dc_motors import DC_MOTOR_KEYS, parse_dc_motors
 from planarm.scene.joint import JointSpec
 from planarm.scene.joint_space import JOINT_SPACE_KEYS, JointSpaceSpec, read_joint_space
@@ -160,6 +160,9 @@ def scene_from_toml(data: dict[str, object], source: str) -> Scene:
     moving = read_moving(root, planner.on_roadmap)
     joints = _joints(root, links)
     coupling = parse_coupling(root.table("transmission", TRANSMISSION_KEYS, optional=True), links)
+    board = root.table("board", BOARD_KEYS, optional=True)
+    wiring, switches = parse_wiring(board, joints, coupling), parse_limit_switches(root, links)
+    require_inputs(root, switches, wiring, links)
     return Scene(
         name=root.text("name", Path(source).stem or source),
         source=source,
@@ -176,11 +179,12 @@ def scene_from_toml(data: dict[str, object], source: str) -> Scene:
         if "joint_space" in data
         else None,
         motion=read_motion(root.table("motion", MOTION_KEYS, optional=True)),
-        limit_switches=parse_limit_switches(root, links),
+        limit_switches=switches,
         roadmap=parse_roadmap(root.table("roadmap", ROADMAP_KEYS, optional=True)),
         dc_motors=parse_dc_motors(root.table("dc_motors", DC_MOTOR_KEYS, optional=True), links),
         moving=moving,
-        wiring=parse_board(root.table("board", BOARD_KEYS, optional=True), joints, coupling),
+        wiring=wiring,
+        board_spec=parse_board(board),
     )
 
 

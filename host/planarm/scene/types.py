@@ -5,6 +5,7 @@ from math import ceil, floor
 from typing import Literal
 
 from planarm.errors import SceneError
+from planarm.scene.board import BoardSpec
 from planarm.scene.dc_motors import DcMotorSpec
 from planarm.scene.joint import JointSpec
 from planarm.scene.joint_space import JointSpaceSpec
@@ -164,6 +165,8 @@ class Scene:
     """How to plan in space and time; None: obstacles rest."""
     wiring: str = OWN
     """The wire's pin map: how the drivers are wired, and whether they need long pulses."""
+    board_spec: BoardSpec = field(default_factory=BoardSpec)
+    """What the board is told of its surroundings."""
 
     @property
     def board(self) -> Board:

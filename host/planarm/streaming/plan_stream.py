@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from math import ceil, degrees, radians
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 import planarm
 from planarm.dynamics.release import falls_on_release
@@ -15,42 +17,84 @@ from planarm.link.journal import JournalWriter
 from planarm.link.recording import RecordingTransport
 from planarm.link.session import SessionLimits
 from planarm.link.stream import Joining, Stream, StreamOptions, StreamProgress
+from planarm.link.stream_values import no_soft_limits
 from planarm.link.transport import Transport
-from planarm.model.transmission import Transmission, motor_axes
+from planarm.model.transmission import Transmission
 from planarm.scene import Scene
 from planarm.stepping.certificate import Certificate
 from planarm.stepping.plan import SegmentPlan
-from planarm.stepping.windows import start_stop_ticks
+from planarm.streaming.board_settings import config_of, soft_limits_of
 from planarm_wire.messages import SPEC_HASH
 from planarm_wire.steps import signed_steps
 
 JOURNAL_NAME = "run.journal"
 PLAN_NAME = "run.plan"
+LOOKED_AT_RAD = radians(2.0)
+"""Between two poses of a plan that are looked at; gravity's torque changes by 3 % of its most within that."""
 FULL_STEPS_RELEASED = 2
 """A rotor whose driver lost its supply comes to rest within two full steps of where it was, if nothing moves it."""
 
 
-def options_for(scene: Scene, plan: SegmentPlan) -> StreamOptions:
-    """Return how a plan of a scene is streamed."""
+def options_for(scene: Scene, plan: SegmentPlan, *, known: bool = True) -> StreamOptions:
+    """Return how a plan of a scene is streamed; an arm whose place is not `known` has no soft limits."""
     flat, resting = not scene.mechanics.gravity, plan.board.joints - len(scene.joints)
     spread = (*(FULL_STEPS_RELEASED * joint.microsteps for joint in scene.joints), *(0,) * resting)
     return StreamOptions(
         allowances=plan.allowances,
-        start_stop_ticks=tuple(start_stop_ticks(axis) for axis in motor_axes(scene.joints, scene.coupling)),
+        config=config_of(scene),
+        soft_limits=soft_limits_of(scene) if known else no_soft_limits(plan.board),
+        start_usteps=plan.start_usteps if known else (),
         released_spread_usteps=spread if flat else (),
         wiring=plan.wiring,
     )
 
 
 def warn_of_release(scene: Scene, plan: SegmentPlan, warn: Callable[[str], None]) -> None:
-    """Say so when the arm would fall where the plan begins or ends, once its drivers let go of it."""
-    begin = np.array(plan.start_usteps)
-    moved = [[signed_steps(move) for move in segment.moves] for segment in plan.segments]
-    end = begin + np.array(moved).sum(axis=0)[: len(begin)] if moved else begin
-    arm = Transmission.of(scene)
-    falling = falls_on_release(scene, (arm.q_rad(begin), arm.q_rad(end)))
-    if falling is not None:
-        warn(str(falling))
+    """Say so when the arm would fall anywhere along the plan, once its drivers let go of it; tell where most."""
+    falling = falls_on_release(scene, poses_along(scene, plan))
+    if falling is None:
+        return
+    idle_s = scene.board_spec.idle_release_s
+    soon = "" if idle_s is None else f"; board.idle_release_s releases them {idle_s:g} s after the motion"
+    warn(f"{falling}{soon}")
+
+
+def warn_of_switches(scene: Scene, plan: SegmentPlan, warn: Callable[[str], None]) -> None:
+    """Say so when a plan presses a limit switch: the board ends the motion there. One pressed at its start may open."""
+    q_rad = poses_along(scene, plan)
+    for switch in scene.limit_switches:
+        angles = q_rad[:, switch.joint - 1]
+        pressed = angles >= switch.at_rad if switch.above else angles <= switch.at_rad
+        left = np.logical_or.accumulate(~pressed)
+        if (pressed & left).any():
+            side, worst = ("above", angles.max()) if switch.above else ("below", angles.min())
+            warn(
+                f"joint {switch.joint} presses its limit switch on the way, at {degrees(worst):.1f} degrees: it is"
+                f" pressed {side} {degrees(switch.at_rad):.1f}, and the board then ends the motion with a fault; change"
+                " arm.joint_limits_deg or the switch's place"
+            )
+
+
+def warn_before(scene: Scene, plan: SegmentPlan, warn: Callable[[str], None]) -> None:
+    """Say what may go wrong with a plan on this arm, before it begins."""
+    warn_of_release(scene, plan, warn)
+    warn_of_switches(scene, plan, warn)
+
+
+def poses_along(scene: Scene, plan: SegmentPlan) -> NDArray[np.float64]:
+    """Return joint angles along a plan, its ends among them, shape (n, joints).
+
+    They are those at its segments' borders, and between them so many more that no motor turns its joint by more than
+    about LOOKED_AT_RAD from one to the next.
+    """
+    transmission, begin = Transmission.of(scene), np.array(plan.start_usteps)
+    moved = [[signed_steps(move) for move in segment.moves[: len(begin)]] for segment in plan.segments]
+    borders = begin + np.cumsum([np.zeros(len(begin), int), *moved], axis=0)
+    turned_rad = np.abs(np.diff(borders, axis=0)) / np.array([joint.usteps_per_rad for joint in scene.joints])
+    way = np.concatenate([[0.0], np.cumsum(turned_rad.max(axis=1, initial=0.0))])
+    at = np.union1d(way[[0, -1]], np.linspace(0.0, way[-1], 1 + ceil(way[-1] / LOOKED_AT_RAD)))
+    usteps = np.column_stack([np.interp(at, way, border) for border in borders.T])
+    return transmission.q_rad(usteps)
 
 
 def record(transport: Transport, out: Path, port: str, scene: Scene) -> RecordingTransport:

@@ -22,7 +22,11 @@ from planarm.model.kinematics import forward, inverse_2r
 from planarm.model.transmission import Transmission
 from planarm.plan_file import arm_hash
 from planarm.scene import Scene
-from planarm_wire.messages import QUEUE_FRAME_BYTES, Clear, State
+from planarm.streaming.configure import configure
+from planarm_wire.messages import QUEUE_FRAME_BYTES, Clear, Fault, State, Status
+
+POSITION_LOST = (Fault.EMERGENCY_STOP, Fault.STOP_INPUT, Fault.HOMING_FAILED)
+"""Faults after which the count is not the arm's place."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,7 +36,7 @@ class Standing:
     Attributes:
         session: the open session.
         usteps: of each motor, by the ledger.
-        how: by what it knows that; None: it was told nothing since it started.
+        how: by what it knows that; None: it was told nothing since it started, or has lost it.
     """
 
     session: Session
@@ -48,9 +52,29 @@ def look(transport: Transport, port: str, scene: Scene, positions: Positions) ->
         DeviceFault: it refuses.
     """
     session, status = open_on_board(transport, scene.board)
-    assert session.welcome is not None, "an open session has a welcome"
-    how = positions.how(port, session.welcome.boot_nonce, arm_hash(asdict(scene)))
+    how = known_by(session, status, port, scene, positions)
     return Standing(session, status.ledger.position_usteps[: len(scene.joints)], how)
+
+
+def known_by(session: Session, status: Status, port: str, scene: Scene, positions: Positions) -> str | None:
+    """Return by what a board knows where its arm is; None where it was told nothing, or has lost it since."""
+    assert session.welcome is not None, "an open session has a welcome"
+    boot = session.welcome.boot_nonce
+    if status.fault in POSITION_LOST:
+        positions.forget(port, boot)
+    return positions.how(port, boot, arm_hash(asdict(scene)))
+
+
+def look_and_configure(transport: Transport, port: str, scene: Scene, positions: Positions) -> Standing:
+    """Ask a board where its arm is, and make sure that it has the scene's CONFIG before it moves.
+
+    Raises:
+        LinkError, DeviceFault: as `look` and `configure`.
+    """
+    standing = look(transport, port, scene, positions)
+    known = standing.usteps if standing.how is not None else None
+    configure(transport, standing.session, port, scene, positions, known)
+    return standing
 
 
 def tell(
@@ -109,6 +133,20 @@ def pose_of(scene: Scene, usteps: tuple[int, ...]) -> tuple[NDArray[np.float64],
     return q_rad, (float(x_cm), float(y_cm))
 
 
+def prepare(transport: Transport, port: str, scene: Scene, positions: Positions, start_usteps: tuple[int, ...]) -> None:
+    """Get a board ready for motions that begin where somebody brought its arm; an emulated one is told its place.
+
+    Raises:
+        LinkError, DeviceFault: as `look_and_configure`.
+    """
+    if transport.pins is None:
+        look_and_configure(transport, port, scene, positions)
+        return
+    session = open_session(transport)
+    session.require_board(scene.board)
+    request(transport, session, position_of(start_usteps, session.joints))
+
+
 def require_standing(standing: Standing, scene: Scene, wanted: tuple[int, ...]) -> None:
     """Check that the arm is known to stand where a plan begins.
 
@@ -118,8 +156,9 @@ def require_standing(standing: Standing, scene: Scene, wanted: tuple[int, ...]) 
     x_cm, y_cm = pose_of(scene, wanted)[1]
     if standing.how is None:
         raise LinkError(
-            f"where the arm stands is not known: the board restarted since it was told. The plan starts at ({x_cm:.2f},"
-            f" {y_cm:.2f}) cm: 'planarm home SCENE' with limit switches, or put the arm there and 'planarm zero SCENE'"
+            "where the arm stands is not known: the board restarted, or was stopped in an emergency, since it was told."
+            f" The plan starts at ({x_cm:.2f}, {y_cm:.2f}) cm: 'planarm home SCENE' with limit switches, or put the arm"
+            " there and 'planarm zero SCENE'"
         )
     if standing.usteps != wanted:
         at_cm = pose_of(scene, standing.usteps)[1]
@@ -147,10 +186,8 @@ def settle_start(
         DeviceFault: the board refuses.
     """
     if transport.pins is not None:
-        session = open_session(transport)
-        session.require_board(scene.board)
-        request(transport, session, position_of(wanted, session.joints))
+        prepare(transport, port, scene, positions, wanted)
         return
     if vouched:
         tell(transport, port, scene, positions, wanted, "vouched for")
-    require_standing(look(transport, port, scene, positions), scene, wanted)
+    require_standing(look_and_configure(transport, port, scene, positions), scene, wanted)
