@@ -89,7 +89,8 @@ bool start(const Run& run) {
     hal::step_forget_match<JOINT>();
     const uint16_t nearest = static_cast<uint16_t>(hal::counter() + margin);
     if (static_cast<int16_t>(edge - nearest) < 0) return false;
-    if (hal::emergency() != hal::Emergency::NONE) return true;
+    // Its interrupt may be off because a step has just been missed, or by an emergency.
+    if (missed() || hal::emergency() != hal::Emergency::NONE) return true;
     hal::step_arm<JOINT>();
     hal::step_interrupt_on<JOINT>();
     return true;

@@ -66,8 +66,9 @@ namespace wire = planarm::wire;
 
 // From the look at Timer1 to the setting of Timer2.
 constexpr uint16_t LOOK_TICKS = 40;
-// A step that would rise later than this after its tick is missed.
-constexpr uint16_t LATEST_TICKS = 300;
+// A step that would rise later than 12 us after its tick is missed: joint 2's pin rises 20 after the look at
+// Timer1, joint 3's 40 when joint 2 is on.
+constexpr uint16_t LATEST_TICKS = 192 - 20;
 // As far as Timer2 wakes, less the early ticks: 240 of its counts.
 constexpr uint16_t FARTHEST_TICKS = 240 * 32 - SCHEDULED_EARLY_TICKS;
 
@@ -106,8 +107,8 @@ ISR(TIMER2_COMPA_vect, ISR_NAKED) {
         brsh 1f
         movw r30, r24
         rjmp 1f
-    2:  subi r24, lo8(-(%[early] + %[latest]))  ; a step that is too late is not made
-        sbci r25, hi8(-(%[early] + %[latest]))
+    2:  subi r24, lo8(-(%[early] + %[latest] - 20 * \joint))  ; a step that is too late is not made
+        sbci r25, hi8(-(%[early] + %[latest] - 20 * \joint))
         brpl 3f
         rjmp 75f
     3:  sbi  \port, \bit
