@@ -2,9 +2,9 @@
 
     python firmware/build.py avr        hex and elf by avr-gcc, of every board of core/boards
     python firmware/build.py pio        the same through `pio run`, without PlatformIO's registry
-    python firmware/build.py native     the core as a shared library for this computer, for tests
+    python firmware/build.py native     the core as a shared library for this computer, for tests [--board NAME]
     python firmware/build.py test       the core's own tests through `pio test`, sanitizers on
-    python firmware/build.py fuzz       libFuzzer's target, by clang: OUT/fuzz_line [CORPUS] [-runs=N]
+    python firmware/build.py fuzz       libFuzzer's target, by clang: OUT/fuzz_line [CORPUS] [-runs=N]; [--board NAME]
     python firmware/build.py release    writes release/BOARD.hex and release/BOARD.json of every board
     python firmware/build.py check      proves that both builds equal release/*.hex, byte for byte
 
@@ -37,7 +37,7 @@ PLATFORM_COMPILE = ("-mmcu=atmega328p", "-DF_CPU=16000000L")
 PLATFORM_LINK = ("-mmcu=atmega328p",)
 
 PIO_TIMEOUT_S = 50  # a package that is missing is asked for over and over; the store below has them all
-NATIVE_FLAGS = ("-O1", "-g", "-fPIC", "-fsanitize=undefined", "-fno-sanitize-recover=all")
+NATIVE_FLAGS = ("-O1", "-g", "-fPIC", "-fno-sanitize-recover=all")
 FUZZ_FLAGS = ("-Wno-sign-conversion", "-O1", "-g", "-fsanitize=fuzzer,address,undefined", "-fno-sanitize-recover=all")
 
 
@@ -186,23 +186,31 @@ def test_pio(out: Path) -> str:
     return run_pio(out, "test", "-e", "native")
 
 
-def build_native(out: Path) -> Path:
-    """Build the core with its hardware layer for this computer as a shared library; return it."""
+def read_native(board: str) -> tuple[list[str], list[Path]]:
+    """Flags without optimising, debugging and sanitizers, and sources, of a board's core on this computer."""
     flags, sources = read_settings("native")
     kept = [flag for flag in flags if not flag.startswith(("-fsanitize", "-fno-sanitize", "-O", "-g"))]
+    return [f"-Icore/boards/{board}" if flag == "-Icore/boards/uno" else flag for flag in kept], sources
+
+
+def build_native(out: Path, board: str = "uno", sanitizers: str = "undefined") -> Path:
+    """Build a board's core with its hardware layer for this computer as a shared library; return it.
+
+    With `address` among the sanitizers a process must have loaded libasan first (LD_PRELOAD).
+    """
+    flags, sources = read_native(board)
     out.mkdir(parents=True, exist_ok=True)
     library = out / "libplanarm_firmware.so"
-    run(["g++", "-shared", *kept, *NATIVE_FLAGS, "-o", str(library), *map(str, sources)])
+    run(["g++", "-shared", *flags, *NATIVE_FLAGS, f"-fsanitize={sanitizers}", "-o", str(library), *map(str, sources)])
     return library
 
 
-def build_fuzz(out: Path) -> Path:
+def build_fuzz(out: Path, board: str = "uno") -> Path:
     """Build libFuzzer's target for the frame receiver, the dispatcher and what they lead to; return the program."""
-    flags, sources = read_settings("native")
-    kept = [flag for flag in flags if not flag.startswith(("-fsanitize", "-fno-sanitize", "-O", "-g"))]
+    flags, sources = read_native(board)
     out.mkdir(parents=True, exist_ok=True)
     program = out / "fuzz_line"
-    run(["clang++", *kept, *FUZZ_FLAGS, "-o", str(program), "fuzz/fuzz_line.cpp", *map(str, sources)])
+    run(["clang++", *flags, *FUZZ_FLAGS, "-o", str(program), "fuzz/fuzz_line.cpp", *map(str, sources)])
     return program
 
 
@@ -273,22 +281,26 @@ def check(out: Path) -> str:
 COMMANDS: dict[str, Callable[[Path], Path | str]] = {
     "avr": build_avr,
     "pio": build_pio,
-    "native": build_native,
     "test": test_pio,
-    "fuzz": build_fuzz,
     "release": release,
     "check": check,
 }
+FOR_THIS_COMPUTER: dict[str, Callable[[Path, str], Path]] = {"native": build_native, "fuzz": build_fuzz}
 
 
 def main() -> int:
     """Carry out one command; return the exit code."""
     parser = argparse.ArgumentParser(description="Builds planarm's firmware.")
-    parser.add_argument("command", choices=COMMANDS)
+    parser.add_argument("command", choices=(*COMMANDS, *FOR_THIS_COMPUTER))
     parser.add_argument("--out", type=Path, default=BUILD, help="folder for everything that is built")
+    parser.add_argument("--board", choices=BOARDS, default="uno", help="whose core native and fuzz build")
     arguments = parser.parse_args()
+    out = arguments.out.resolve()
     try:
-        result = COMMANDS[arguments.command](arguments.out.resolve())
+        if arguments.command in FOR_THIS_COMPUTER:
+            result: Path | str = FOR_THIS_COMPUTER[arguments.command](out, arguments.board)
+        else:
+            result = COMMANDS[arguments.command](out)
     except BuildError as error:
         sys.stderr.write(f"firmware/build.py {arguments.command}: {error}\n")
         return 1

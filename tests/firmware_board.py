@@ -152,9 +152,8 @@ class EmulatedFirmware:
 class NativeFirmware:
     """The shared library that `firmware/build.py native` makes. It holds one board."""
 
-    wiring = UNO
-
-    def __init__(self, library: Path) -> None:
+    def __init__(self, library: Path, wiring: Wiring = UNO) -> None:
+        self.wiring = wiring
         self._library = ctypes.CDLL(str(library))
         self._library.planarm_power_on.argtypes = (ctypes.c_uint32, ctypes.c_uint64, _Delays)
         self._library.planarm_receive.argtypes = (ctypes.c_char_p, ctypes.c_size_t)

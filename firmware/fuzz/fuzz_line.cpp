@@ -7,8 +7,9 @@
 //   1  a sound frame with the number that the device expects: a type, then that many payload bytes
 //   2  time: a count of 16 bits, in units of 64 ticks
 //   3  the inputs: limit switches and the stop input
-// Whatever happens, a pulse ends before the next begins, rising edges of a joint keep the least interval, DIR
-// stands still while STEP is high, and everything that is sent back is a sound frame.
+// Whatever happens, a pulse ends before the next begins, high, low and least interval of a joint are kept,
+// DIR stands still while STEP is high and long enough before it rises, the ledger is what the pins have made,
+// and everything that is sent back is a sound frame.
 
 #include <stddef.h>
 #include <stdint.h>
@@ -21,6 +22,9 @@
 #include "frame_receiver.h"
 #include "framing.h"
 #include "hal_crc.h"
+#include "settings.h"
+#include "step_engine.h"
+#include "supervisor.h"
 
 namespace {
 
@@ -70,36 +74,84 @@ Bytes line_of(uint8_t seq, uint8_t type, const Bytes& payload) {
 
 struct Joint {
     bool high = false;
+    uint64_t changed = LONG_AGO;
     uint64_t rose = LONG_AGO;
+    bool dir_high = false;
+    uint64_t turned = LONG_AGO;
+    int32_t steps = 0;  // with DIR high less those with DIR low, since the last look
+    int32_t told = 0;   // the ledger at that look
 };
+
+bool is_apart(uint64_t earlier, uint64_t later, uint64_t ticks) {
+    return earlier == LONG_AGO || later - earlier >= ticks;
+}
 
 // What is seen from outside: the pins and the line back.
 class Witness {
   public:
-    Witness() { receiver_.reset(); }
+    Witness() {
+        receiver_.reset();
+        to_device_.reset();
+    }
 
     uint8_t expected_seq() const { return expected_seq_; }
+
+    // What is brought to the device: SET_POSITION may come in it.
+    void note(const Bytes& line) {
+        for (uint8_t byte : line) {
+            if (to_device_.receive(&byte, 1).event != FrameReceiver::Event::FRAME) continue;
+            if (to_device_.frame().type == static_cast<uint8_t>(wire::MessageType::SET_POSITION))
+                told_ = true;
+        }
+    }
 
     void look() {
         planarm_edge edge;
         while (planarm_take_edges(&edge, 1) != 0) see(edge);
         uint8_t byte;
         while (planarm_take_sent(&byte, 1) != 0) hear(byte);
+        compare_ledger();
     }
 
   private:
     void see(const planarm_edge& edge) {
         for (uint8_t joint = 0; joint < wire::JOINTS; ++joint) {
             Joint& seen = joints_[joint];
-            if (edge.pin == wire::DIR_PINS[joint]) require(!seen.high, "DIR changed while STEP was high");
+            if (edge.pin == wire::DIR_PINS[joint]) {
+                require(!seen.high, "DIR changed while STEP was high");
+                seen.dir_high = edge.level != 0;
+                seen.turned = edge.tick;
+            }
             if (edge.pin != wire::STEP_PINS[joint]) continue;
             require((edge.level != 0) != seen.high, "STEP rose or fell twice");
+            const uint64_t least = seen.high ? wire::MIN_STEP_HIGH_TICKS : wire::MIN_STEP_LOW_TICKS;
+            require(is_apart(seen.changed, edge.tick, least), "STEP high or low for too short a time");
             seen.high = edge.level != 0;
+            seen.changed = edge.tick;
             if (!seen.high) continue;
-            require(seen.rose == LONG_AGO || edge.tick - seen.rose >= wire::MIN_INTERVAL_TICKS,
+            require(is_apart(seen.rose, edge.tick, wire::MIN_INTERVAL_TICKS),
                     "two steps nearer than the least interval");
+            require(is_apart(seen.turned, edge.tick, wire::MIN_DIR_SETUP_TICKS), "DIR too late for STEP");
             seen.rose = edge.tick;
+            seen.steps += seen.dir_high ? 1 : -1;
         }
+    }
+
+    // Every step is counted, but for an emergency stop, which loses the position, and SET_POSITION.
+    void compare_ledger() {
+        const planarm::step_engine::Position position = planarm::step_engine::position();
+        const wire::Fault fault = planarm::supervisor::fault();
+        const bool lost = fault == wire::Fault::EMERGENCY_STOP || fault == wire::Fault::STOP_INPUT;
+        for (uint8_t joint = 0; joint < wire::JOINTS; ++joint) {
+            Joint& seen = joints_[joint];
+            const bool inverted = (planarm::settings::config.dir_inverted >> joint & 1) != 0;
+            const int32_t made = inverted ? -seen.steps : seen.steps;
+            require(lost || told_ || position.usteps[joint] - seen.told == made,
+                    "the ledger is not what the pins have made");
+            seen.told = position.usteps[joint];
+            seen.steps = 0;
+        }
+        told_ = false;
     }
 
     void hear(uint8_t byte) {
@@ -110,6 +162,8 @@ class Witness {
 
     Joint joints_[wire::JOINTS];
     FrameReceiver receiver_;
+    FrameReceiver to_device_;
+    bool told_ = false;
     uint8_t expected_seq_ = 0;
 };
 
@@ -132,6 +186,7 @@ class Script {
 };
 
 void bring(const Bytes& line, Witness& witness) {
+    witness.note(line);
     planarm_receive(line.data(), line.size());
     planarm_run(REPLY_TICKS);
     witness.look();

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib
 import importlib.util
+import os
 import shutil
 import subprocess
 import sys
@@ -14,11 +15,15 @@ import pytest
 
 from firmware_board import EmulatedFirmware, Firmware, NativeFirmware
 
+LIBRARY = "PLANARM_NATIVE_LIBRARY"
 ROOT = Path(__file__).parents[2]
 
 
 @pytest.fixture(scope="session")
 def native_firmware(tmp_path_factory: pytest.TempPathFactory) -> NativeFirmware:
+    """The core under the undefined-behaviour sanitizer, or the library that test_firmware_sanitizers.py names."""
+    if LIBRARY in os.environ:
+        return NativeFirmware(Path(os.environ[LIBRARY]))
     if shutil.which("g++") is None:
         pytest.skip("g++ is not installed: the firmware's core cannot be built for this computer")
     out = tmp_path_factory.mktemp("firmware")

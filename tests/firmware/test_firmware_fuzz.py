@@ -11,8 +11,10 @@ from pathlib import Path
 import pytest
 
 from firmware_board import run_of, segment_of
+from planarm_wire.boards import Board as Wiring
 from planarm_wire.codec import encode
 from planarm_wire.messages import (
+    BOARDS,
     EMERGENCY_CODE,
     HOLD_CODE,
     Config,
@@ -46,10 +48,13 @@ def wait(ms: float) -> bytes:
     return bytes([TIME]) + int(ms * 16_000 / 64).to_bytes(2, "little")
 
 
-def scripts() -> list[bytes]:
+def scripts(board: Wiring) -> list[bytes]:
     """A motion that is held, starved, stopped; homing; an emergency: where the fuzzer begins."""
-    away = segment_of(60_000, run_of(60, interval=900), run_of(150, interval=390))
-    back = segment_of(60_000, run_of(60, interval=900, positive=False), run_of(30, interval=1900))
+    joints, least = board.joints, board.min_interval_ticks
+    away = segment_of(
+        60_000, run_of(40, interval=1300), run_of(50_000 // (least + 150), interval=least + 150), joints=joints
+    )
+    back = segment_of(60_000, run_of(40, interval=1300, positive=False), run_of(30, interval=1900), joints=joints)
     awake = frame(Enable(1)) + wait(25)
     moving = awake + frame(Segments(200, 200, 1, (away, back))) + frame(Start(20_000))
     return [
@@ -57,7 +62,7 @@ def scripts() -> list[bytes]:
         moving + record(LINE, bytes([HOLD_CODE])) + wait(9) + frame(Resume()) + wait(9),
         moving + frame(Override(30)) + wait(9) + frame(Stop(1)) + wait(9) + frame(Query()),
         moving + wait(2) + record(LINE, bytes([EMERGENCY_CODE] * 3)) + wait(2),
-        frame(Config(PinMap.OWN, 2, 1, 0b1100, 0, 0, 56, (160_000, 160_000)))
+        frame(Config(PinMap[board.pin_map.upper()], joints, 1, 0b1100, 0, 0, 56, (160_000,) * joints))
         + awake
         + frame(Home(0, 1, 3000, 160_000, 400, 100))
         + wait(20)
@@ -67,18 +72,20 @@ def scripts() -> list[bytes]:
 
 
 @pytest.mark.skipif(shutil.which("clang++") is None, reason="clang++ is not installed: no libFuzzer")
-def test_no_input_breaks_a_rule(tmp_path: Path, sized: Callable[[int, int], int]) -> None:
-    made = subprocess.run(
-        [sys.executable, str(BUILD), "fuzz", "--out", str(tmp_path)], capture_output=True, text=True, check=False
-    )
+@pytest.mark.parametrize("board", [pytest.param(BOARDS[name], id=name) for name in ("uno", "uno_four")])
+def test_no_input_breaks_a_rule(tmp_path: Path, sized: Callable[[int, int], int], board: Wiring) -> None:
+    runs = sized(1500 if board.joints == 2 else 0, 300_000)
+    if not runs:
+        pytest.skip("clang takes ten seconds for a core: four joints with --full")
+    command = [sys.executable, str(BUILD), "fuzz", "--board", board.name, "--out", str(tmp_path)]
+    made = subprocess.run(command, capture_output=True, text=True, check=False)
     if "libclang_rt.fuzzer" in made.stderr:
         pytest.skip("clang++ has no libFuzzer here (Debian: libclang-rt-dev)")
     assert made.returncode == 0, made.stderr
     corpus = tmp_path / "corpus"
     corpus.mkdir()
-    for number, script in enumerate(scripts()):
+    for number, script in enumerate(scripts(board)):
         (corpus / f"script_{number}").write_bytes(script)
-    runs = sized(1500, 300_000)
     done = subprocess.run(
         [str(tmp_path / "fuzz_line"), str(corpus), f"-runs={runs}", "-seed=1", "-max_len=600", "-len_control=0"],
         cwd=tmp_path,

@@ -259,6 +259,7 @@ namespace {
 
 void end_pulses(hal::Emergency cause) {
     hal::steps_off();
+    hal::wait_step_high();
     planarm::for_each_joint([](auto joint) { hal::step_fall<joint.NUMBER>(); });
     ++uno.emergencies;
     uno.emergency_cause = cause;

@@ -173,7 +173,7 @@ inline uint16_t end_steps() {
     return last;
 }
 
-inline void wait_step_high() { board::elapse(57); }
+inline void wait_step_high() { board::elapse(planarm::wire::MIN_STEP_HIGH_TICKS + 1); }
 
 template <uint8_t JOINT>
 bool dir_is(bool positive) {
