@@ -18,12 +18,12 @@ SWITCHES = """
 [[limit_switches]]
 joint = 1
 pin = "A1"
-at_deg = 43
+at_deg = 56
 side = "above"
 [[limit_switches]]
 joint = 2
 pin = "A2"
-at_deg = -63
+at_deg = -67
 side = "below"
 """
 
@@ -86,7 +86,7 @@ def test_zero_goto_jog_and_home_know_where_the_arm_is_from_one_program_to_the_ne
         assert (asked["usteps"], asked["known_by"]) == (jogged["usteps"], "zeroed")
         homed = told(start("home", scene, "--json"))
         assert homed["known_by"] == "homed"
-        assert homed["joints_deg"] == pytest.approx([43.0, -63.0], abs=0.5)
+        assert homed["joints_deg"] == pytest.approx([56.0, -67.0], abs=0.5)
         back = told(start("goto", scene, 42, 12, "--json"))
         assert back["usteps"] == pytest.approx(zeroed["usteps"], abs=8), "switches and zero agree"
 

@@ -171,6 +171,18 @@ def test_a_jog_exactly_to_the_limit_is_lawful(plan, positions):
     )
 
 
+def test_a_jog_onto_a_switch_is_warned_of_before_and_then_ends_with_its_fault(plan, positions):
+    start = plan.segments.start_usteps
+    scene = with_switches_near(plan.scene, start)
+    line = line_to(scene, start)
+    line.clock.wait_until(0.05)
+    tell(line, PORT, scene, positions, start, "zeroed")
+    standing, said = look_and_configure(line, PORT, scene, positions), []
+    with pytest.raises(StreamFault, match="joint 2: a limit switch closed during a motion"):
+        jog(line, scene, standing, 1, np.radians(-3.0), lambda _told: None, said.append)
+    assert [text.split(" on the way")[0] for text in said] == ["joint 2 presses its limit switch"]
+
+
 def upright(scene):
     return replace(scene, mechanics=replace(scene.mechanics, gravity=True, end_masses_kg=(0.0, 0.1)))
 

@@ -24,7 +24,8 @@ def execute(options: argparse.Namespace) -> int:
         standing = look_and_configure(arm.transport, arm.port, arm.scene, arm.positions)
         pose = pose_rad(arm.scene, options.deg) if options.deg else None
         target_cm = None if options.deg else (options.x_cm, options.y_cm)
-        _, done = goto(arm.transport, arm.scene, standing, target_cm, telling(notice, notice.watch), pose)
+        watch = telling(notice, notice.watch)
+        _, done = goto(arm.transport, arm.scene, standing, target_cm, watch, pose, notice.warn)
     moved = moved_usteps(done.ledger_before, done.ledger_after)[: len(standing.usteps)]
     usteps = tuple(at + by for at, by in zip(standing.usteps, moved, strict=True))
     tell_standing(options.json, arm.scene, usteps, standing.how, moved_usteps=list(moved))

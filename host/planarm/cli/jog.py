@@ -24,7 +24,8 @@ def execute(options: argparse.Namespace) -> int:
             raise UsageError(f"joint {options.joint}: the scene has joints 1 to {len(arm.scene.joints)}")
         standing = look_and_configure(arm.transport, arm.port, arm.scene, arm.positions)
         turn_rad = radians(options.degrees)
-        _, done = jog(arm.transport, arm.scene, standing, options.joint - 1, turn_rad, telling(notice, notice.watch))
+        watch = telling(notice, notice.watch)
+        _, done = jog(arm.transport, arm.scene, standing, options.joint - 1, turn_rad, watch, notice.warn)
     moved = moved_usteps(done.ledger_before, done.ledger_after)[: len(standing.usteps)]
     usteps = tuple(at + by for at, by in zip(standing.usteps, moved, strict=True))
     tell_standing(options.json, arm.scene, usteps, standing.how, moved_usteps=list(moved))

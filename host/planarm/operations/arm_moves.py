@@ -24,13 +24,14 @@ from planarm.smoothing.joint_blend import blend_poses
 from planarm.stepping.certify import certify
 from planarm.stepping.plan import SegmentPlan
 from planarm.stepping.schedule import schedule
-from planarm.streaming.plan_stream import options_for, stream
+from planarm.streaming.plan_stream import options_for, stream, warn_before
 from planarm.streaming.standing import Standing, pose_of
 from planarm.trajectory.limits import Limits
 from planarm.trajectory.timing import fastest_motion
 from planarm.workspace.joint_proof import joint_world
 
 Progress = Callable[[StreamProgress], None]
+Warn = Callable[[str], None]
 
 
 def goto(
@@ -40,8 +41,11 @@ def goto(
     target_cm: tuple[float, float] | None,
     on_progress: Progress,
     pose_rad: NDArray[np.float64] | None = None,
+    warn: Warn | None = None,
 ) -> tuple[SegmentPlan, StreamResult]:
     """Plan a certified path from where the arm stands to a point, or to joint angles, and execute it.
+
+    `warn` is told before it moves what may go wrong: an arm that would fall on release, a limit switch on its way.
 
     Raises:
         LinkError: the arm's place is not known.
@@ -59,7 +63,10 @@ def goto(
             f"the arm stands on the other elbow side, {standing.usteps} instead of {plan.segments.start_usteps} usteps;"
             " plan in joint space ([joint_space]), or jog it to this side",
         )
-    result = stream(plan.segments, plan.certificate, transport, on_progress, options_for(there, plan.segments))
+    if warn is not None:
+        warn_before(there, plan.segments, warn)
+    how = options_for(there, plan.segments)
+    result = stream(plan.segments, plan.certificate, transport, on_progress, how, warn=warn)
     return plan.segments, result
 
 
@@ -82,9 +89,17 @@ def _task(
 
 
 def jog(
-    transport: Transport, scene: Scene, standing: Standing, joint: int, by_rad: float, on_progress: Progress
+    transport: Transport,
+    scene: Scene,
+    standing: Standing,
+    joint: int,
+    by_rad: float,
+    on_progress: Progress,
+    warn: Warn | None = None,
 ) -> tuple[SegmentPlan, StreamResult]:
     """Turn one joint, from 0, by an angle, straight; among the obstacles where the arm's place is known.
+
+    `warn` is told as in `goto`, where the place is known.
 
     Raises:
         NoPathError: it would touch one.
@@ -105,5 +120,7 @@ def jog(
     start_cm = pose_of(scene, standing.usteps)[1]
     here = replace(free, task=replace(scene.task, start_cm=start_cm, goal_cm=goal_cm))
     certificate = certify(here, trajectory, train, segments)
+    if known and warn is not None:
+        warn_before(scene, segments, warn)
     options = options_for(scene, segments, known=known)
-    return segments, stream(segments, certificate, transport, on_progress, options)
+    return segments, stream(segments, certificate, transport, on_progress, options, warn=warn)
