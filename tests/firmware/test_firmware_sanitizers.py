@@ -20,11 +20,13 @@ from firmware_board import Board, NativeFirmware, Schedule, end_motion, run_of, 
 from planarm_wire.messages import BOARDS, Fault, State
 
 HERE = Path(__file__).parent
+ROOT = HERE.parents[1]
 LIBRARY = "PLANARM_NATIVE_LIBRARY"  # conftest.py
-SHORT = ("test_firmware_protocol.py", "test_firmware_faults.py")
+SHORT = ("test_firmware_protocol.py", "test_firmware_outcomes.py", "-k", "protocol or quick_stop")
 WHOLE = (
-    *SHORT,
+    "test_firmware_faults.py",
     "test_firmware_outcomes.py",
+    "test_firmware_protocol.py",
     "test_firmware_steps.py",
     "test_firmware_stops.py",
     "test_firmware_stretch.py",
@@ -40,16 +42,16 @@ def test_the_core_under_the_address_sanitizer(
     except builder.BuildError as error:
         pytest.skip(f"no address sanitizer here (Debian: libasan, with g++): {error}")
     found = subprocess.run(["g++", "-print-file-name=libasan.so"], capture_output=True, text=True, check=True)
-    files = [str(HERE / name) for name in (SHORT, WHOLE)[sized(0, 1)]]
+    chosen = (SHORT, WHOLE)[sized(0, 1)]
     # The interpreter itself leaks by design.
     settings = {LIBRARY: str(library), "LD_PRELOAD": found.stdout.strip(), "ASAN_OPTIONS": "detect_leaks=0"}
     done = subprocess.run(
-        [sys.executable, "-m", "pytest", "-x", "-p", "no:cacheprovider", "-k", "native", *files],
+        [sys.executable, "-m", "pytest", "-x", "-p", "no:cacheprovider", "--rootdir", str(ROOT), *chosen],
         env=os.environ | settings,
         capture_output=True,
         text=True,
         check=False,
-        cwd=HERE.parents[1],
+        cwd=HERE,
     )
     assert done.returncode == 0, (done.stdout + done.stderr)[-6000:]
 
