@@ -103,16 +103,11 @@ def code_start(elf: Path) -> str:
 def require_free_registers(elf: Path, flags: list[str]) -> None:
     """Raise BuildError if any code but the interrupts uses a register that `flags` keep for them (-ffixed-rN).
 
-    The flags bind our own compiler only; the libraries of the compiler are linked as they are. Of those the common
-    prologue and epilogue (-mcall-prologues) save and restore all registers that calls keep, the interrupts' first: what
-    counts is the code from where the earliest jump goes.
+    The flags bind our own compiler only; the libraries of the compiler are linked as they are.
     """
     numbers = [flag.removeprefix("-ffixed-r") for flag in flags if flag.startswith("-ffixed-r")]
     kept = re.compile(rf"\br(?:{'|'.join(numbers)})\b")
-    disassemble = ["avr-objdump", "-d", "--no-show-raw-insn", f"--start-address={code_start(elf)}", str(elf)]
-    listing = run(disassemble)
-    jumps = re.findall(r"\s0x([0-9a-f]+) <(__prologue_saves__|__epilogue_restores__)\b", listing)
-    entered = {name: min(int(at, 16) for at, to in jumps if to == name) for _, name in jumps}
+    listing = run(["avr-objdump", "-d", "--no-show-raw-insn", f"--start-address={code_start(elf)}", str(elf)])
     for function in listing.split("\n\n"):
         title, *lines = function.splitlines() or [""]
         name = title.partition("<")[2].rstrip(">:")
@@ -120,8 +115,7 @@ def require_free_registers(elf: Path, flags: list[str]) -> None:
             continue
         for line in lines:
             address, _, instruction = line.partition(":\t")
-            reached = name not in entered or int(address, 16) >= entered[name]
-            if reached and kept.search(instruction.split(";", 1)[0]):
+            if kept.search(instruction.split(";", 1)[0]):
                 raise BuildError(f"{elf}: {name} {address.strip()}: {instruction!r} uses a register of the interrupts")
 
 

@@ -9,13 +9,10 @@ from collections.abc import Callable
 from functools import cache
 from pathlib import Path
 
-JUMPS = (
-    "__prologue_saves__",
-    "__epilogue_restores__",
-    "__tablejump2__",
-)  # back into the function that they are used by
+PROLOGUE, EPILOGUE = "common_prologue", "common_epilogue"  # firmware/hal/uno/prologue.cpp
+JUMPS = (PROLOGUE, EPILOGUE, "__tablejump2__")  # back into the function that they are used by
 RETURN_BYTES = 2  # of a return address, with 32 KB of flash
-SAVED_REGISTERS = 18  # by all of the compiler's common prologue
+PUSH_BYTES = 2  # of code
 
 FUNCTION = re.compile(r"^(?P<at>[0-9a-f]+) <(?P<name>.+)>:\n(?P<body>(?:.+\n)*)", re.M)
 CALL, JUMP = re.compile(r"r?call\t.*0x(?P<to>[0-9a-f]+) <"), re.compile(r"r?jmp\t.*0x(?P<to>[0-9a-f]+) <")
@@ -35,7 +32,8 @@ def deepest_stack_bytes(elf: Path) -> tuple[int, list[str]]:
         at, name, _ = functions[bisect_right(starts, address) - 1]
         return name, address - at
 
-    calls = {name: _calls(name, body.splitlines(), place) for _, name, body in functions}
+    saved = next(body.count("\tpush\t") for _, name, body in functions if name == PROLOGUE)
+    calls = {name: _calls(name, body.splitlines(), saved, place) for _, name, body in functions}
 
     @cache
     def deepest(name: str) -> tuple[int, tuple[str, ...]]:
@@ -49,8 +47,13 @@ def deepest_stack_bytes(elf: Path) -> tuple[int, list[str]]:
     return 2 * RETURN_BYTES + program + interrupt, [*path, *handler]
 
 
-def _calls(function: str, body: list[str], place: Callable[[int], tuple[str, int]]) -> list[tuple[int, str]]:
-    """What is on the stack above the return address when each function is called, and with no callee at most."""
+def _calls(
+    function: str, body: list[str], saved: int, place: Callable[[int], tuple[str, int]]
+) -> list[tuple[int, str]]:
+    """What is on the stack above the return address when each function is called, and with no callee at most.
+
+    `saved` are the registers that all of the common prologue saves.
+    """
     depth = most = 0
     low = high = 0
     found: list[tuple[int, str]] = []
@@ -74,9 +77,9 @@ def _calls(function: str, body: list[str], place: Callable[[int], tuple[str, int
             found.append((depth + RETURN_BYTES, place(int(match["to"], 16))[0]))
         elif match := JUMP.match(instruction):
             name, offset = place(int(match["to"], 16))
-            if name == "__prologue_saves__":
-                depth += SAVED_REGISTERS - offset // 2 + low + 256 * high
-            elif name == "__epilogue_restores__":
+            if name == PROLOGUE:
+                depth += saved - offset // PUSH_BYTES + low + 256 * high
+            elif name == EPILOGUE:
                 depth = most
             elif name != function:
                 found.append((depth, name))  # in place of a call before RET
