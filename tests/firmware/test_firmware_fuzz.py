@@ -62,6 +62,7 @@ def scripts(board: Wiring) -> list[bytes]:
         moving + record(LINE, bytes([HOLD_CODE])) + wait(9) + frame(Resume()) + wait(9),
         moving + frame(Override(30)) + wait(9) + frame(Stop(1)) + wait(9) + frame(Query()),
         moving + wait(2) + record(LINE, bytes([EMERGENCY_CODE] * 3)) + wait(2),
+        moving + wait(2) + frame(Segments(0, 0, 0, (segment_of(0, joints=joints),))) + wait(2),
         frame(Config(PinMap[board.pin_map.upper()], joints, 1, 0b1100, 0, 0, 56, (160_000,) * joints))
         + awake
         + frame(Home(0, 1, 3000, 160_000, 400, 100))
