@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from firmware_board import run_of, segment_of
+from firmware_board import LEAD_TICKS, run_of, segment_of
 from planarm_wire.boards import Board as Wiring
 from planarm_wire.codec import encode
 from planarm_wire.messages import (
@@ -56,13 +56,13 @@ def scripts(board: Wiring) -> list[bytes]:
     )
     back = segment_of(60_000, run_of(40, interval=1300, positive=False), run_of(30, interval=1900), joints=joints)
     awake = frame(Enable(1)) + wait(25)
-    moving = awake + frame(Segments(200, 200, 1, (away, back))) + frame(Start(20_000))
+    moving = awake + frame(Segments(200, 200, 1, (away, back))) + frame(Start(LEAD_TICKS))
     return [
         moving + wait(30),
         moving + record(LINE, bytes([HOLD_CODE])) + wait(9) + frame(Resume()) + wait(9),
         moving + frame(Override(30)) + wait(9) + frame(Stop(1)) + wait(9) + frame(Query()),
-        moving + wait(2) + record(LINE, bytes([EMERGENCY_CODE] * 3)) + wait(2),
-        moving + wait(2) + frame(Segments(0, 0, 0, (segment_of(0, joints=joints),))) + wait(2),
+        moving + wait(4) + record(LINE, bytes([EMERGENCY_CODE] * 3)) + wait(2),
+        moving + wait(4) + frame(Segments(0, 0, 0, (segment_of(0, joints=joints),))) + wait(2),
         frame(Config(PinMap[board.pin_map.upper()], joints, 1, 0b1100, 0, 0, 56, (160_000,) * joints))
         + awake
         + frame(Home(0, 1, 3000, 160_000, 400, 100))
