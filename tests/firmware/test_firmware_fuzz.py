@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from firmware_board import LEAD_TICKS, run_of, segment_of
+from firmware_board import LEAD_TICKS, end_motion, run_of, segment_of
 from planarm_wire.boards import Board as Wiring
 from planarm_wire.codec import encode
 from planarm_wire.messages import (
@@ -56,7 +56,7 @@ def scripts(board: Wiring) -> list[bytes]:
     )
     back = segment_of(60_000, run_of(40, interval=1300, positive=False), run_of(30, interval=1900), joints=joints)
     awake = frame(Enable(1)) + wait(25)
-    moving = awake + frame(Segments(200, 200, 1, (away, back))) + frame(Start(LEAD_TICKS))
+    moving = awake + frame(Segments(200, 200, 1, tuple(end_motion((away, back))))) + frame(Start(LEAD_TICKS))
     return [
         moving + wait(30),
         moving + record(LINE, bytes([HOLD_CODE])) + wait(9) + frame(Resume()) + wait(9),
