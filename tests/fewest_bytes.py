@@ -17,7 +17,8 @@ from scipy.optimize import linprog
 from planarm.stepping.segments import Coding
 from planarm.stepping.train import StepTrain, least_reversal_ticks
 from planarm.stepping.windows import least_interval_ticks
-from planarm_wire.messages import BOARDS, MAX_INTERVAL_TICKS, MAX_SEGMENT_TICKS, MIN_DIR_SETUP_TICKS
+from planarm_wire.messages import BOARDS, MAX_COARSE_STEPS, MAX_SEGMENT_TICKS, MIN_DIR_SETUP_TICKS
+from planarm_wire.steps import LONGEST_INTERVAL_TICKS
 
 SHARE_OF_FRAME = 4
 """Bytes of a segment's frame beside it: header 3, two checks of 2, delimiter; as a rule two segments share a frame."""
@@ -133,12 +134,13 @@ class _Joint:
         if m - n == 1:
             return 0
         interval = max(self.least, self.low[n + 1] - self.high[n] - 1.0)
-        if interval > MAX_INTERVAL_TICKS:
+        if interval > LONGEST_INTERVAL_TICKS:
             return None
         add_q16 = 0.0 if m - n == 2 else self._least_add(n, m)
         if add_q16 is None:
             return None
-        return varuint_bytes(256.0 * interval) + varuint_bytes(2.0 * max(0.0, add_q16 - 1.0))
+        unit = 256.0 if m - n <= MAX_COARSE_STEPS else 1.0
+        return varuint_bytes(256.0 * interval) + varuint_bytes(2.0 * max(0.0, (add_q16 - 1.0) / unit))
 
     def _least_add(self, n, m):
         """The size of the smallest add that makes the steps, in 2^-16 ticks; None when none does."""
@@ -149,7 +151,7 @@ class _Joint:
         last = np.array([0.0, 1.0, count - 2.0, 0.0])
         size = np.array([[0.0, 0.0, 1.0, -1.0], [0.0, 0.0, -1.0, -1.0]])
         a = np.vstack([rows, -rows, -last, last, [0, -1, 0, 0], [0, 1, 0, 0], size])
-        limits = [-self.least, MAX_INTERVAL_TICKS]
+        limits = [-self.least, LONGEST_INTERVAL_TICKS]
         b = np.r_[self.high[n:m] + 1 - self.ticks[n], self.ticks[n] - self.low[n:m], limits, limits, 0.0, 0.0]
         found = linprog([0, 0, 0, 1], a, b, bounds=[(None, None)] * 4)
         return 65536.0 * found.fun if found.status == 0 else None

@@ -21,6 +21,7 @@ from planarm_wire.framing import Frame, FrameDecoder, encode_frame
 from planarm_wire.messages import (
     BAUD,
     BOARDS,
+    MAX_COARSE_STEPS,
     PROTOCOL_VERSION,
     QUEUE_BYTES,
     QUEUE_FRAME_BYTES,
@@ -356,7 +357,9 @@ def run_of(
         return REST
     if steps == 1:
         return Move(2 + positive, first, 0, 0)
-    return Move(2 * steps + positive, first, (interval << 8) + fraction, add << 16)
+    return Move(
+        2 * steps + positive, first, (interval << 8) + fraction, add << (8 if steps <= MAX_COARSE_STEPS else 16)
+    )
 
 
 def segment_of(duration: int, *moves: Move, last: bool = False, joints: int = UNO.joints) -> Segment:

@@ -7,7 +7,15 @@ import random
 from fractions import Fraction
 
 from firmware_board import segment_of
-from planarm_wire.messages import MAX_INTERVAL_TICKS, MIN_DIR_SETUP_TICKS, MIN_INTERVAL_TICKS, Move, Segment
+from planarm_wire.messages import (
+    MAX_COARSE_STEPS,
+    MAX_INTERVAL_TICKS,
+    MIN_DIR_SETUP_TICKS,
+    MIN_INTERVAL_TICKS,
+    Move,
+    Segment,
+)
+from planarm_wire.steps import move_of
 
 
 def fast_moves(duration: int, begun_at: Fraction, interval_q8: int) -> tuple[Move, Fraction]:
@@ -58,10 +66,12 @@ class RestlessJoint:
             self.rest_ticks += duration
             return Move(0)
         add = (abs(end - self.interval) << 16) // (steps - 1)  # rounded to 0: no interval gets below the least
+        if steps <= MAX_COARSE_STEPS:
+            add &= ~0xFF  # whole 2^-8 ticks
         add = add if end >= self.interval else -add
         last = first + ((steps - 1) * (self.interval << 16) + (steps - 1) * (steps - 2) // 2 * add >> 16)
         self.rest_ticks = duration - last
-        move = Move(2 * steps + positive, first, self.interval << 8, add)
+        move = move_of(steps, positive, first, self.interval << 8, add)
         self.positive, self.interval = positive, max(self.least_interval, self.interval + (steps - 2) * add // 65_536)
         assert self.interval <= MAX_INTERVAL_TICKS and self.rest_ticks > 0
         return move

@@ -462,7 +462,7 @@ def _move(chance: random.Random, ticks: int, least_ticks: int) -> Move:
         return Move(steps_dir, first)
     room = min((ticks - 2 * margin - 20) // steps, 50_000)
     interval = chance.randrange((least_ticks + 10) << 8, room << 8)
-    return Move(steps_dir, first, interval, chance.randrange(-(10 << 16) // steps, (10 << 16) // steps))
+    return Move(steps_dir, first, interval, chance.randrange(-(10 << 8) // steps, (10 << 8) // steps))
 
 
 def frames_written(line: ModelLine) -> list[Frame]:

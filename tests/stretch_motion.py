@@ -12,9 +12,9 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 from firmware_board import end_motion
-from planarm_wire.messages import TICKS_HZ, Move, Segment
+from planarm_wire.messages import MAX_COARSE_STEPS, TICKS_HZ, Move, Segment
 from planarm_wire.rates import need_code, rate_code, rate_value
-from planarm_wire.steps import duration_ticks, step_ticks
+from planarm_wire.steps import add_q16, duration_ticks, move_of, step_ticks
 
 SEGMENT_TICKS = 56_000
 ONE = 1 << 16
@@ -95,8 +95,10 @@ def _move(phase: float, begin_hz: float, end_hz: float, positive: bool) -> tuple
     n, m = count - 1, count // 2
     # The quadratic through the first, the middle and the last step.
     add = round(((span / n) - (middle << 16) / m) / (n / 2 - m / 2))
+    if count <= MAX_COARSE_STEPS:
+        add = round(add / 256) * 256
     interval_q8 = round((span / n - add * (n - 1) / 2) / 256)
-    return Move(2 * count + positive, ticks[0], interval_q8, add), total - count
+    return move_of(count, positive, ticks[0], interval_q8, add), total - count
 
 
 def _needs(
@@ -185,7 +187,7 @@ def largest_accelerations(motion: HoldableMotion, stretches: Sequence[int]) -> l
             if move.steps_dir < 6:
                 continue
             count = move.steps_dir >> 1
-            intervals = [(256 * move.interval_q8 + i * move.add_q16) / ONE for i in (0, count - 2)]
+            intervals = [(256 * move.interval_q8 + i * add_q16(move)) / ONE for i in (0, count - 2)]
             speeds = [1 / interval for interval in intervals]
             bend = (speeds[1] - speeds[0]) / (step_ticks(move)[-1] - step_ticks(move)[0])
             s0, s1 = stretches[k] / ONE, stretches[k + 1] / ONE

@@ -9,6 +9,7 @@ namespace {
 // The longest interval inside a run, and the longest wait between two runs that the step interrupt bridges:
 // the 16-bit timer must tell early from late.
 constexpr uint16_t MOST_AHEAD_TICKS = 32000;
+static_assert(MOST_AHEAD_TICKS < wire::MIN_SLOW_INTERVAL_TICKS, "slow moves are made step by step");
 constexpr uint32_t MOST_AHEAD_Q16 = static_cast<uint32_t>(MOST_AHEAD_TICKS) << 16;
 
 // A joint that has not moved yet did so this long ago.
@@ -19,52 +20,54 @@ uint16_t whole_ticks(uint32_t ticks_q16) { return static_cast<uint16_t>(ticks_q1
 }  // namespace
 
 void Cursor::reset() {
-    left_ = 0;
+    left_.count = 0;
     last_path_ticks_ = 0 - LONG_AGO_TICKS;
 }
 
 void Cursor::begin(const Move& move) {
     at_ = {move.first_ticks, 0};
-    interval_q16_ = move.interval_q16;
-    add_q16_ = static_cast<uint32_t>(move.add_q16);
-    left_ = move.steps;
+    left_ = move;
     guess_ = 0;
-    positive_ = move.positive;
 }
 
-bool Cursor::has_step_in(const Slice& slice) const { return left_ != 0 && at_.high < slice.path_ticks(); }
+bool Cursor::has_step_in(const Slice& slice) const {
+    return left_.count != 0 && at_.high < slice.path_ticks();
+}
 
 bool Cursor::is_calm(const Slice& slice, uint32_t start_stop_ticks) const {
     if (!has_step_in(slice)) return true;
     uint32_t least_ticks = at_.high - last_path_ticks_;
-    if (left_ > 1) {
-        least_ticks = least_of(least_ticks, interval_q16_ >> 16);
-        const uint32_t change = multiply_low(add_q16_, static_cast<uint16_t>(left_ - 2));
-        least_ticks = least_of(least_ticks, (interval_q16_ + change) >> 16);
+    if (left_.count > 1) {
+        const uint32_t change = multiply_low(left_.add, static_cast<uint16_t>(left_.count - 2));
+        uint32_t interval = least_of(left_.interval, left_.interval + change) >> 8;
+        if (left_.slow == 0) interval >>= 8;
+        least_ticks = least_of(least_ticks, interval);
     }
     return multiply_q16(least_ticks, slice.least_stretch()) >= start_stop_ticks;
 }
 
 void Cursor::step() {
-    add_to(at_, from_q16(interval_q16_));
-    increase(interval_q16_, add_q16_);
+    Fixed48 interval = from_q16(left_.interval);
+    if (left_.slow != 0) interval = {left_.interval >> 8, static_cast<uint16_t>(left_.interval << 8)};
+    add_to(at_, interval);
+    increase(left_.interval, left_.add);
 }
 
 // n I + n (n - 1) / 2 A further. A product with an A below 0 is 2^32 times the factor too large.
 void Cursor::skip(uint8_t steps) {
     const uint8_t before = static_cast<uint8_t>(steps - 1);
     const uint16_t pairs = static_cast<uint16_t>(static_cast<uint16_t>(steps) * before) >> 1;
-    add_to(at_, multiply(interval_q16_, steps));
-    add_to(at_, multiply(add_q16_, pairs));
-    if (static_cast<int32_t>(add_q16_) < 0)
+    add_to(at_, multiply(left_.interval, steps));
+    add_to(at_, multiply(left_.add, pairs));
+    if (static_cast<int32_t>(left_.add) < 0)
         increase(at_.high, static_cast<uint32_t>(static_cast<uint16_t>(0 - pairs)) << 16);
-    increase(interval_q16_, multiply_low(add_q16_, steps));
+    increase(left_.interval, multiply_low(left_.add, steps));
 }
 
 // As many as the slice before had, or as fit at the interval of now.
 uint8_t Cursor::guess(uint16_t path_ticks) const {
     if (guess_ != 0) return guess_;
-    const uint32_t whole = path_ticks / ((interval_q16_ >> 16) + 1);
+    const uint32_t whole = path_ticks / ((left_.interval >> 16) + 1);
     return whole < step_engine::MAX_RUN_STEPS ? static_cast<uint8_t>(whole + 1) : step_engine::MAX_RUN_STEPS;
 }
 
@@ -72,8 +75,8 @@ uint8_t Cursor::guess(uint16_t path_ticks) const {
 // their number becomes right in some turns. None is left for a run of its own: a run keeps the least
 // interval, two times of a stretched slice may come out a tick closer.
 uint8_t Cursor::go_to_last(const Slice& slice, const Cursor& first) {
-    const uint8_t most =
-        left_ < step_engine::MAX_RUN_STEPS ? static_cast<uint8_t>(left_) : step_engine::MAX_RUN_STEPS;
+    const uint8_t most = left_.count < step_engine::MAX_RUN_STEPS ? static_cast<uint8_t>(left_.count)
+                                                                  : step_engine::MAX_RUN_STEPS;
     uint8_t steps = most;
     if (!slice.ends_segment()) steps = guess(static_cast<uint16_t>(slice.path_ticks() - at_.high));
     if (steps > most) steps = most;
@@ -81,12 +84,15 @@ uint8_t Cursor::go_to_last(const Slice& slice, const Cursor& first) {
     // Back by what is too far at the interval there (after a move's end it may be 0), the longest where
     // intervals grow.
     while (at_.high >= slice.path_ticks()) {
-        const uint32_t less = (at_.high - slice.path_ticks()) / (interval_q16_ >> 16 | 1) + 1;
+        const uint32_t less = (at_.high - slice.path_ticks()) / (left_.interval >> 16 | 1) + 1;
         steps = steps > less ? static_cast<uint8_t>(steps - less) : 1;
         *this = first;
         skip(static_cast<uint8_t>(steps - 1));
     }
-    while (steps != most && at_.high + ((interval_q16_ + at_.low) >> 16) < slice.path_ticks()) {
+    while (steps != most &&
+           left_.interval <
+               (static_cast<uint32_t>(static_cast<uint16_t>(slice.path_ticks() - at_.high)) << 16) -
+                   at_.low) {
         step();
         ++steps;
     }
@@ -98,7 +104,7 @@ uint8_t Cursor::go_to_last(const Slice& slice, const Cursor& first) {
 // interrupt cannot bridge them.
 bool Cursor::fit(const Slice& slice, uint16_t first_path, Run& run) const {
     uint16_t first = whole_ticks(run.interval_q16);
-    uint16_t last = whole_ticks(interval_q16_ - add_q16_);
+    uint16_t last = whole_ticks(left_.interval - left_.add);
     const uint16_t last_path = static_cast<uint16_t>(at_.high);
     // The stretch is that in the middle of an interval.
     first = slice.stretched(first, static_cast<uint16_t>(first_path + first / 2));
@@ -129,17 +135,18 @@ bool Cursor::fit(const Slice& slice, uint16_t first_path, Run& run) const {
 bool Cursor::take(const Slice& slice, Run& run) {
     const Cursor first = *this;
     const uint16_t first_path = static_cast<uint16_t>(at_.high);
-    run.positive = positive_;
+    run.positive = left_.positive;
     run.fraction = at_.low;
-    run.interval_q16 = interval_q16_;
-    run.add_q16 = add_q16_;
+    run.interval_q16 = left_.interval;
+    run.add_q16 = left_.add;
     run.first_ticks = slice.ticks_at(first_path);
-    run.steps = go_to_last(slice, first);
+    // The step interrupt bridges none of a slow move's intervals.
+    run.steps = left_.slow != 0 ? 1 : go_to_last(slice, first);
     const bool near = run.first_ticks - last_ticks_ <= MOST_AHEAD_TICKS;
     last_ticks_ = slice.ticks_at(static_cast<uint16_t>(at_.high));
     if (run.steps != 1) {
         const bool fits = slice.is_plain() ? run.interval_q16 <= MOST_AHEAD_Q16 &&
-                                                 interval_q16_ - add_q16_ <= MOST_AHEAD_Q16
+                                                 left_.interval - left_.add <= MOST_AHEAD_Q16
                                            : fit(slice, first_path, run);
         if (!fits) {
             *this = first;
@@ -150,9 +157,9 @@ bool Cursor::take(const Slice& slice, Run& run) {
     // From slice to slice the number of steps changes little: where one run makes them all it is a good
     // guess.
     const bool all =
-        run.steps != step_engine::MAX_RUN_STEPS && first_path <= whole_ticks(first.interval_q16_);
+        run.steps != step_engine::MAX_RUN_STEPS && first_path <= whole_ticks(first.left_.interval);
     guess_ = all ? run.steps : 0;
-    left_ = static_cast<uint16_t>(left_ - run.steps);
+    left_.count = static_cast<uint16_t>(left_.count - run.steps);
     last_path_ticks_ = at_.high;
     step();
     return near;

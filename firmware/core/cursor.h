@@ -42,11 +42,8 @@ class Cursor {
     bool fit(const path_clock::Slice& slice, uint16_t first_path, Run& run) const;
 
     Fixed48 at_;  // path time of the next step, from the slice's start
-    uint32_t interval_q16_;
-    uint32_t add_q16_;  // modulo 2^32
-    uint16_t left_;
-    uint8_t guess_;  // steps of the segment's slice before; 0: none yet
-    bool positive_;
+    Steps left_;
+    uint8_t guess_;             // steps of the segment's slice before; 0: none yet
     uint32_t last_path_ticks_;  // path time of the last step, from the slice's start, modulo 2^32
     uint32_t last_ticks_;       // its tick
 };

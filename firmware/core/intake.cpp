@@ -81,7 +81,7 @@ wire::Result check_next() {
         Move move;
         read_move(at.reader, move);
         good = good && check_move(move, head.duration_ticks, end);
-        if (move.steps != 0 && is_out_of_limits(joint, end.usteps)) at.joint_out = joint;
+        if (move.count != 0 && is_out_of_limits(joint, end.usteps)) at.joint_out = joint;
         ++joint;
     }
     if (!at.reader.ok()) return wire::Result::MALFORMED;

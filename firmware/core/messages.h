@@ -13,7 +13,7 @@ namespace wire {
 // Both ends must have the same.
 constexpr uint8_t PROTOCOL_VERSION = 2;
 // Of the specification without its wording.
-constexpr uint32_t SPEC_HASH = 0xF20E09A7UL;
+constexpr uint32_t SPEC_HASH = 0x28E54E5DUL;
 
 // Ends every frame.
 constexpr uint8_t DELIMITER = 0x7E;
@@ -68,8 +68,17 @@ constexpr uint32_t DEFAULT_WAKE_TICKS = 160000UL;
 constexpr uint8_t WATCHDOG_MS = 250;
 // A limit switch counts when it stays so for this long, 5 ms.
 constexpr uint32_t DEBOUNCE_TICKS = 80000UL;
-// Largest interval inside a run of more than one step; longer gaps need a segment of their own.
-constexpr uint16_t MAX_INTERVAL_TICKS = 60000U;
+// Largest interval inside a move that begins with a shorter one than slow_interval_ticks.
+constexpr uint16_t MAX_INTERVAL_TICKS = 65535U;
+// 4.1 ms; a move of two steps or more that begins with so long an interval is slow, and has limits
+// of its own.
+constexpr uint32_t SLOW_INTERVAL_TICKS = 65536UL;
+// Least interval inside a slow move.
+constexpr uint16_t MIN_SLOW_INTERVAL_TICKS = 32768U;
+// Largest interval inside a slow move, 1.05 s; longer gaps need a segment of their own.
+constexpr uint32_t MAX_SLOW_INTERVAL_TICKS = 16777215UL;
+// A move of so many steps or fewer tells its add in 2^-8 ticks; a slow move has no more.
+constexpr uint8_t MAX_COARSE_STEPS = 128;
 // The device cuts segments into equal slices of at most 3.6 ms, the last shorter by the rounding up
 // of the others. One run of a joint fills a slice at its least interval. The path clock's rate
 // changes from slice to slice.

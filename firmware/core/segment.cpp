@@ -6,28 +6,33 @@ namespace planarm {
 
 namespace {
 
-constexpr uint32_t LEAST_INTERVAL_Q16 = static_cast<uint32_t>(wire::MIN_INTERVAL_TICKS) << 16;
-constexpr uint32_t MOST_INTERVAL_Q16 = static_cast<uint32_t>(wire::MAX_INTERVAL_TICKS) << 16;
-
-bool is_interval(uint32_t ticks_q16) {
-    return ticks_q16 >= LEAST_INTERVAL_Q16 && ticks_q16 <= MOST_INTERVAL_Q16;
-}
+// Limits of intervals in units of 2^16: ticks, or 2^8 ticks in a slow move. What 32 bits hold is not too
+// long.
+constexpr uint16_t LEAST_SLOW = wire::MIN_SLOW_INTERVAL_TICKS >> 8;
+static_assert(wire::MAX_INTERVAL_TICKS == 0xFFFF && wire::MAX_SLOW_INTERVAL_TICKS == 0xFFFFFF, "of 32 bits");
+static_assert((wire::MIN_SLOW_INTERVAL_TICKS & 0xFF) == 0, "whole units");
+static_assert(wire::SLOW_INTERVAL_TICKS == 0x10000, "the fourth byte tells");
 
 }  // namespace
 
 // Intervals change by the same amount each time, so all are in their limits when the first and the last are.
 uint32_t run_ticks(const Move& move) {
-    if (move.steps < 2) return 0;
-    const uint32_t first = move.interval_q16;
-    const bool shrinks = move.add_q16 < 0;
-    const uint32_t add = static_cast<uint32_t>(move.add_q16);
+    if (move.count < 2) return 0;
+    const uint32_t first = move.interval;
+    const bool shrinks = static_cast<int32_t>(move.add) < 0;
     const uint32_t change =
-        multiply_saturated(shrinks ? 0 - add : add, static_cast<uint16_t>(move.steps - 2));
+        multiply_saturated(shrinks ? 0 - move.add : move.add, static_cast<uint16_t>(move.count - 2));
     const uint32_t last = shrinks ? first - change : first + change;
     const bool fits = (last < first) == (shrinks && change != 0);
-    if (!fits || !is_interval(first) || !is_interval(last)) return NO_RUN;
+    uint16_t least = wire::MIN_INTERVAL_TICKS;
     // n (first + last) / 2 for n = steps - 1 intervals.
-    const uint16_t n = static_cast<uint16_t>(move.steps - 1);
+    uint16_t n = static_cast<uint16_t>(move.count - 1);
+    if (move.slow != 0) {
+        if (n >= wire::MAX_COARSE_STEPS) return NO_RUN;
+        least = LEAST_SLOW;
+        n = static_cast<uint16_t>(n << 8);
+    }
+    if (!fits || first >> 16 < least || last >> 16 < least) return NO_RUN;
     Fixed48 twice = multiply(first, n);
     add_to(twice, multiply(last, n));
     return twice.high >> 1;
@@ -39,23 +44,26 @@ void read_head(Reader& reader, SegmentHead& head) {
     head.last = (duration_flags & 1) != 0;
 }
 
+// From 2^-8, modulo 2^32.
+[[gnu::noinline]] static void to_q16(uint32_t& value) { value <<= 8; }
+
 void read_move(Reader& reader, Move& move) {
     const uint32_t steps_dir = reader.varuint();
+    move = Move();
     move.positive = (steps_dir & 1) != 0;
     // More steps than fit are kept as too many, for check_move to refuse.
     const uint16_t steps =
         steps_dir > 0xFFFF ? 0xFFFF : static_cast<uint16_t>(static_cast<uint16_t>(steps_dir) >> 1);
-    move.steps = steps;
-    move.first_ticks = 0;
-    move.interval_q16 = 0;
-    move.add_q16 = 0;
+    move.count = steps;
     if (steps == 0) return;
     move.first_ticks = reader.varuint();
     if (steps == 1) return;
-    // What does not fit is kept as too long, for check_move to refuse.
-    const uint32_t interval_q8 = reader.varuint();
-    move.interval_q16 = interval_q8 > 0xFFFFFF ? 0xFFFFFFFF : interval_q8 << 8;
-    move.add_q16 = reader.varint();
+    move.interval = reader.varuint();
+    move.slow = static_cast<uint8_t>(move.interval >> 24);
+    move.add = static_cast<uint32_t>(reader.varint());
+    if (move.slow != 0) return;
+    to_q16(move.interval);
+    if (steps <= wire::MAX_COARSE_STEPS) to_q16(move.add);
 }
 
 // A rest that is so much longer; what does not fit is FOREVER. `ticks` are less than 2^31.
@@ -65,11 +73,11 @@ void read_move(Reader& reader, Move& move) {
 }
 
 bool check_move(const Move& move, uint32_t duration_ticks, JointEnd& end) {
-    if (move.steps == 0) {
+    if (move.count == 0) {
         end.rest_ticks = longer_rest(end.rest_ticks, duration_ticks);
         return true;
     }
-    if (move.steps > wire::MAX_SEGMENT_STEPS || move.first_ticks >= duration_ticks) return false;
+    if (move.count > wire::MAX_SEGMENT_STEPS || move.first_ticks >= duration_ticks) return false;
     const uint32_t last_ticks = move.first_ticks + run_ticks(move);
     if (last_ticks >= duration_ticks) return false;
 
@@ -78,7 +86,7 @@ bool check_move(const Move& move, uint32_t duration_ticks, JointEnd& end) {
     if (longer_rest(end.rest_ticks, move.first_ticks) < least_ticks) return false;
     end.rest_ticks = longer_rest(0, duration_ticks - last_ticks);
     end.positive = move.positive;
-    const uint32_t steps = move.steps;
+    const uint32_t steps = move.count;
     end.usteps =
         static_cast<int32_t>(static_cast<uint32_t>(end.usteps) + (move.positive ? steps : 0 - steps));
     return true;

@@ -8,14 +8,19 @@
 
 namespace planarm {
 
-// One joint's steps in a segment: step n rises first_ticks + floor((n I + n (n - 1) / 2 A) / 2^16) ticks
-// after its start.
-struct Move {
-    uint32_t first_ticks;
-    uint32_t interval_q16;
-    int32_t add_q16;
-    uint16_t steps;
+// Steps with intervals in 2^-16 ticks, or in 2^-8.
+struct Steps {
+    uint32_t interval;
+    uint32_t add;  // modulo 2^32
+    uint16_t count;
     bool positive;
+    uint8_t slow;  // 0: 2^-16
+};
+
+// One joint's steps in a segment: step n rises first_ticks + floor(n I + n (n - 1) / 2 A) ticks after its
+// start.
+struct Move : Steps {
+    uint32_t first_ticks;
 };
 
 // Of a SEGMENTS payload, before its segments: slow, fast and need.

@@ -155,7 +155,7 @@ def _from_json(body: Mapping[str, Any]) -> StoredPlan:
 
 
 def _segment_to_json(segment: Segment) -> list[Any]:
-    moves = [[m.steps_dir, m.first_ticks, m.interval_q8, m.add_q16] for m in segment.moves]
+    moves = [[m.steps_dir, m.first_ticks, m.interval_q8, m.add] for m in segment.moves]
     return [segment.duration_flags, moves]
 
 

@@ -14,7 +14,7 @@ from planarm_wire.layout import EACH_JOINT, END, Field
 
 PROTOCOL_VERSION: Final = 2
 """Both ends must have the same."""
-SPEC_HASH: Final = 0xF20E09A7
+SPEC_HASH: Final = 0x28E54E5D
 """Hash of the specification without its wording."""
 DELIMITER: Final = 0x7E
 """Ends every frame."""
@@ -74,8 +74,16 @@ WATCHDOG_MS: Final = 250
 """The watchdog resets the chip when the main program stands still for so long."""
 DEBOUNCE_TICKS: Final = 80_000
 """A limit switch counts when it stays so for this long, 5 ms."""
-MAX_INTERVAL_TICKS: Final = 60_000
-"""Largest interval inside a run of more than one step; longer gaps need a segment of their own."""
+MAX_INTERVAL_TICKS: Final = 65_535
+"""Largest interval inside a move that begins with a shorter one than slow_interval_ticks."""
+SLOW_INTERVAL_TICKS: Final = 65_536
+"""4.1 ms; a move of two steps or more that begins with so long an interval is slow, and has limits of its own."""
+MIN_SLOW_INTERVAL_TICKS: Final = 32_768
+"""Least interval inside a slow move."""
+MAX_SLOW_INTERVAL_TICKS: Final = 16_777_215
+"""Largest interval inside a slow move, 1.05 s; longer gaps need a segment of their own."""
+MAX_COARSE_STEPS: Final = 128
+"""A move of so many steps or fewer tells its add in 2^-8 ticks; a slow move has no more."""
 SLICE_TICKS: Final = 57_000
 """The device cuts segments into equal slices of at most 3.6 ms, the last shorter by the rounding up of the others.
 
@@ -122,7 +130,7 @@ BOARDS: Final[dict[str, Board]] = {
         doc="Own wiring, four joints: joints 1 and 2 as with two, joints 3 and 4 stepped by one interrupt",
         pin_map="own",
         joints=4,
-        queue_bytes=552,
+        queue_bytes=582,
         min_interval_ticks=1_000,
         min_step_high_ticks=56,
         min_step_low_ticks=40,
@@ -167,7 +175,7 @@ BOARDS: Final[dict[str, Board]] = {
         doc="The Arduino CNC shield as it is, slots X, Y, Z and A (D12 and D13): every step rises in an interrupt",
         pin_map="cnc_shield",
         joints=4,
-        queue_bytes=552,
+        queue_bytes=582,
         min_interval_ticks=1_280,
         min_step_high_ticks=56,
         min_step_low_ticks=40,
@@ -421,7 +429,7 @@ class Move:
     """One joint's steps in a segment, in closed form.
 
     Step n (0 .. steps - 1) rises first_ticks + floor((256 n I + n (n - 1) / 2 A) / 2^16) ticks after the segment's
-    start, where I = interval_q8 and A = add_q16.
+    start, where I = interval_q8 and A = 256 add; in a move of more than max_coarse_steps, A = add.
 
     On the wire 1 to 20 bytes.
     """
@@ -435,8 +443,11 @@ class Move:
     """First rising edge after the segment's start. (ticks, varuint, only when steps_dir >= 2, else 0)"""
     interval_q8: int = 0
     """Interval from step 0 to step 1. (ticks/2^8, varuint, only when steps_dir >= 4, else 0)"""
-    add_q16: int = 0
-    """What each interval has more than the one before. (ticks/2^16, varint, only when steps_dir >= 4, else 0)"""
+    add: int = 0
+    """What each interval has more than the one before; in a move of more than max_coarse_steps, in ticks/2^16.
+
+    (ticks/2^8, varint, only when steps_dir >= 4, else 0)
+    """
 
 
 @dataclass(frozen=True, slots=True)
@@ -813,7 +824,7 @@ LAYOUTS: Final[dict[type[Message | Struct], tuple[Field, ...]]] = {
         Field("steps_dir", "varuint"),
         Field("first_ticks", "varuint", when=("steps_dir", 2)),
         Field("interval_q8", "varuint", when=("steps_dir", 4)),
-        Field("add_q16", "varint", when=("steps_dir", 4)),
+        Field("add", "varint", when=("steps_dir", 4)),
     ),
     Segment: (
         Field("duration_flags", "varuint"),

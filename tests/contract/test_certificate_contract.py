@@ -84,11 +84,10 @@ def one_step_fewer(segments, joint):
 
 
 def earlier(segments, joint):
-    k = max(
-        (k for k in range(len(segments)) if segments[k].moves[joint].first_ticks > 700),
-        key=lambda k: segments[k].moves[joint].steps_dir,
-    )
-    return with_move(segments, k, joint, first_ticks=segments[k].moves[joint].first_ticks - 600)
+    """A run by half of its first ticks, which are as near to an interval as any."""
+    moves = [segment.moves[joint] for segment in segments]
+    k = max(range(len(moves)), key=lambda k: moves[k].first_ticks / max(moves[k].interval_q8, 1 << 16))
+    return with_move(segments, k, joint, first_ticks=moves[k].first_ticks // 2)
 
 
 def longer(segments, joint):
@@ -104,7 +103,8 @@ def shorter_intervals(segments, joint):
 
 def bent(segments, joint):
     k = busy(segments, joint)
-    return with_move(segments, k, joint, add_q16=segments[k].moves[joint].add_q16 + 100 * 65536)
+    move = segments[k].moves[joint]
+    return with_move(segments, k, joint, add=move.add + 100 * (256 if move.steps_dir >> 1 <= 128 else 65536))
 
 
 def doubled(segments, joint):

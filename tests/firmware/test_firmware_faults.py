@@ -27,11 +27,15 @@ from planarm_wire.framing import encode_frame
 from planarm_wire.messages import (
     DELIMITER,
     JOINTS,
+    MAX_COARSE_STEPS,
     MAX_INTERVAL_TICKS,
     MAX_SEGMENT_STEPS,
     MAX_SEGMENT_TICKS,
+    MAX_SLOW_INTERVAL_TICKS,
     MIN_DIR_SETUP_TICKS,
     MIN_INTERVAL_TICKS,
+    MIN_SLOW_INTERVAL_TICKS,
+    SLOW_INTERVAL_TICKS,
     Fault,
     Hello,
     Move,
@@ -46,6 +50,7 @@ from planarm_wire.messages import (
 )
 
 LEAST, MOST = MIN_INTERVAL_TICKS, MAX_INTERVAL_TICKS
+SLOW, LEAST_SLOW, MOST_SLOW = SLOW_INTERVAL_TICKS, MIN_SLOW_INTERVAL_TICKS, MAX_SLOW_INTERVAL_TICKS
 BACK = MIN_INTERVAL_TICKS + MIN_DIR_SETUP_TICKS
 ONE = 1 << 16
 Q8 = 1 << 8
@@ -68,7 +73,14 @@ GOOD = {
     "down to the least interval": segment_of(20_000, run_of(12, interval=LEAST + 10, add=-1)),
     "up to the largest interval": segment_of(20 * MOST, run_of(12, interval=MOST - 10, add=1)),
     "change unused by two steps": segment_of(9000, run_of(2, interval=LEAST, add=-32768)),
-    "fraction carries into the last tick": segment_of(3001, Move(2 * 3, 1000, 1000 * Q8 - 1, 512)),
+    "just not slow": segment_of(30 * MOST, Move(2 * 12, 0, MOST * Q8 + 0xF5, 1)),
+    "most coarse steps": segment_of(200 * LEAST, Move(2 * MAX_COARSE_STEPS, 0, LEAST * Q8, 0)),
+    "an add of 2^24 units is none": segment_of(20 * LEAST, Move(2 * 9, 0, LEAST * Q8, 2**24)),
+    "slow": segment_of(30 * MOST, Move(2 * 12, 0, SLOW * Q8, 23)),
+    "slow down to the least": segment_of(30 * MOST, Move(2 * 12, 0, (LEAST_SLOW + 33_000) * Q8, -3300 * Q8)),
+    "slow up to the largest": segment_of(2**28, Move(2 * 12, 0, MOST_SLOW * Q8, 23)),
+    "most slow steps": segment_of(127 * SLOW + 1, Move(2 * MAX_COARSE_STEPS, 0, SLOW * Q8, 0)),
+    "fraction carries into the last tick": segment_of(3001, Move(2 * 3, 1000, 1000 * Q8 - 1, 2)),
 }
 BAD = {
     "no duration": segment_of(0),
@@ -78,13 +90,21 @@ BAD = {
     "too many steps": segment_of(MAX_SEGMENT_TICKS, Move(2 * (MAX_SEGMENT_STEPS + 1), 0, LEAST << 8, 0)),
     "far too many steps": segment_of(MAX_SEGMENT_TICKS, Move(2**32 - 2, 0, LEAST << 8, 0)),
     "below the least interval": segment_of(9000, Move(2 * 9, 0, LEAST * Q8 - 1, 0)),
-    "above the largest interval": segment_of(20 * MOST, Move(2 * 9, 0, MOST * Q8 + 1, 0)),
-    "falls below the least": segment_of(20_000, Move(2 * 12, 0, (LEAST + 10) * Q8, -ONE - 1)),
-    "rises above the largest": segment_of(20 * MOST, Move(2 * 12, 0, (MOST - 10) * Q8, ONE + 1)),
-    "interval wraps round once": segment_of(MAX_SEGMENT_TICKS, Move(2 * 18, 0, 1000 * Q8, 2**28)),
+    "above the largest interval": segment_of(20 * MOST, Move(2 * 9, 0, MOST * Q8 + 0xF9, 1)),
+    "falls below the least": segment_of(20_000, Move(2 * 12, 0, (LEAST + 10) * Q8, -Q8 - 1)),
+    "rises above the largest": segment_of(20 * MOST, Move(2 * 12, 0, (MOST - 9) * Q8, Q8)),
+    "falls below the least slow one": segment_of(
+        30 * MOST, Move(2 * 12, 0, (LEAST_SLOW + 33_000) * Q8, -3300 * Q8 - 1)
+    ),
+    "rises above the largest slow one": segment_of(2**28, Move(2 * 12, 0, MOST_SLOW * Q8, 26)),
+    "too many slow steps": segment_of(MAX_SEGMENT_TICKS, Move(2 * MAX_COARSE_STEPS + 2, 0, SLOW * Q8, 0)),
+    "slow interval wraps downwards": segment_of(MAX_SEGMENT_TICKS, Move(2 * 18, 0, SLOW * Q8, -(2**30))),
+    "slow last step at the end": segment_of(127 * SLOW, Move(2 * MAX_COARSE_STEPS, 0, SLOW * Q8, 0)),
+    "longest slow run": segment_of(1000, Move(2 * MAX_COARSE_STEPS, 0, 2**32 - 1, 0)),
+    "interval wraps round once": segment_of(MAX_SEGMENT_TICKS, Move(2 * 18, 0, 1000 * Q8, 2**20)),
     "interval wraps far": segment_of(MAX_SEGMENT_TICKS, Move(2 * MAX_SEGMENT_STEPS, 0, 1000 * Q8, 2**31 - 1)),
-    "interval wraps downwards": segment_of(MAX_SEGMENT_TICKS, Move(2 * 18, 0, 50_000 * Q8, -(2**28))),
-    "largest negative change": segment_of(MAX_SEGMENT_TICKS, Move(2 * 4, 0, 50_000 * Q8, -(2**31))),
+    "interval wraps downwards": segment_of(MAX_SEGMENT_TICKS, Move(2 * 18, 0, 50_000 * Q8, -(2**20))),
+    "largest negative change": segment_of(MAX_SEGMENT_TICKS, Move(2 * 4, 0, 50_000 * Q8, -(2**23))),
     "run longer than 2^30 ticks": segment_of(1000, Move(2 * MAX_SEGMENT_STEPS, 0, MOST * Q8, 0)),
     "first step beyond 2^30": segment_of(1000, run_of(1, first=2**32 - 1)),
     "second joint bad": segment_of(9000, run_of(2), Move(2 * 9, 0, LEAST * Q8 - 1, 0)),
@@ -109,7 +129,7 @@ def test_segments_beyond_their_limits_are_faults(board: Board, name: str) -> Non
 @given(
     steps=st.one_of(st.integers(1, 40), st.integers(1, MAX_SEGMENT_STEPS)),
     first=st.integers(0, 2**31),
-    interval=st.one_of(st.integers(LEAST * Q8 - 3, LEAST * Q8 + 3), st.integers(0, 2**24), st.integers(0, 2**32 - 1)),
+    interval=st.one_of(st.integers(LEAST * Q8 - 3, LEAST * Q8 + 3), st.integers(0, 2**25), st.integers(0, 2**32 - 1)),
     add=st.one_of(st.integers(-3, 3), st.integers(-(2**31), 2**31 - 1)),
     aim=st.integers(-2, 2),
 )
@@ -119,12 +139,16 @@ def test_verdict_on_any_move(
     # The rules of docs/protocol.md in plain integers; the duration is aimed at the last step's tick.
     move = Move(2 * steps, first) if steps == 1 else Move(2 * steps, first, interval, add)
     n = steps - 1
+    slow = interval >= SLOW * Q8
+    if steps <= MAX_COARSE_STEPS:
+        add = add * 256 if slow else (add * 256 + 2**31) % 2**32 - 2**31
     last = first + ((256 * n * interval + n * (n - 1) // 2 * add) >> 16 if n else 0)
     duration = max(0, min(last + 1 + aim, 2**31 - 1))
     ends = (256 * interval, 256 * interval + (steps - 2) * add)
     good = 1 <= duration <= MAX_SEGMENT_TICKS and 0 <= last < duration
     if n:
-        good &= min(ends) >= LEAST * ONE and max(ends) <= MOST * ONE
+        least, end = (LEAST_SLOW, MOST_SLOW + 1) if slow else (LEAST, MOST + 1)
+        good &= least * ONE <= min(ends) and max(ends) < end * ONE and (steps <= MAX_COARSE_STEPS or not slow)
     board = Board(native_firmware)
     board.get_ready()
     status = board.ask(Segments(0, 0, 0, (segment_of(duration, move),)))

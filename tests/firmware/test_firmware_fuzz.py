@@ -21,6 +21,7 @@ from planarm_wire.messages import (
     Enable,
     Home,
     HostMessage,
+    Move,
     Override,
     PinMap,
     Query,
@@ -57,7 +58,14 @@ def scripts(board: Wiring) -> list[bytes]:
     back = segment_of(60_000, run_of(40, interval=1300, positive=False), run_of(30, interval=1900), joints=joints)
     awake = frame(Enable(1)) + wait(25)
     moving = awake + frame(Segments(200, 200, 1, tuple(end_motion((away, back))))) + frame(Start(LEAD_TICKS))
+    slow = segment_of(
+        700_000,
+        Move(2 * 7 + 1, 500, 70_000 << 8, 3 << 8),
+        Move(2 * 5, 400, 150_000 << 8, -(9_000 << 8)),
+        joints=joints,
+    )
     return [
+        awake + frame(Segments(200, 200, 1, tuple(end_motion((slow, away))))) + frame(Start(LEAD_TICKS)) + wait(60),
         moving + wait(30),
         moving + record(LINE, bytes([HOLD_CODE])) + wait(9) + frame(Resume()) + wait(9),
         moving + frame(Override(30)) + wait(9) + frame(Stop(1)) + wait(9) + frame(Query()),

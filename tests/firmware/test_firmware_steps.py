@@ -25,12 +25,14 @@ from firmware_board import (
 from planarm_wire.messages import (
     DIR_PINS,
     JOINTS,
-    MAX_INTERVAL_TICKS,
+    MAX_COARSE_STEPS,
     MAX_SEGMENT_TICKS,
     MIN_DIR_SETUP_TICKS,
     MIN_INTERVAL_TICKS,
+    MIN_SLOW_INTERVAL_TICKS,
     MIN_STEP_HIGH_TICKS,
     MIN_STEP_LOW_TICKS,
+    SLOW_INTERVAL_TICKS,
     STEP_PINS,
     Fault,
     Move,
@@ -44,13 +46,14 @@ from planarm_wire.messages import (
 from planarm_wire.steps import step_ticks
 
 MIN_REVERSAL_TICKS = MIN_INTERVAL_TICKS + MIN_DIR_SETUP_TICKS
+LONGEST_SLOW_TICKS = 300_000  # of the moves here
 SHORTEST_SEGMENT_TICKS = 6000  # what the simulated main program, at 600 ticks a pass, prepares in time with ease
 
 
 @st.composite
 def moves(draw: st.DrawFn, rest_ticks: int, was_positive: bool) -> Move:
     """A move that keeps all limits after a rest that followed a step in the direction told."""
-    steps = draw(st.one_of(st.just(0), st.just(1), st.integers(2, 40)))
+    steps = draw(st.one_of(st.just(0), st.just(1), st.integers(2, 40), st.integers(126, 131)))
     if steps == 0:
         return REST
     positive = draw(st.booleans())
@@ -58,12 +61,18 @@ def moves(draw: st.DrawFn, rest_ticks: int, was_positive: bool) -> Move:
     first = max(0, least - rest_ticks) + draw(st.one_of(st.just(0), st.integers(0, 3000), st.integers(0, 200_000)))
     if steps == 1:
         return Move(2 + positive, first)
-    limits = (MIN_INTERVAL_TICKS << 8, MAX_INTERVAL_TICKS << 8)
-    interval = draw(st.one_of(st.integers(limits[0], limits[0] << 2), st.integers(*limits)))
-    room = (256 * (limits[0] - interval), 256 * (limits[1] - interval)) if steps > 2 else (-(2**31), 2**31 - 1)
+    if steps <= MAX_COARSE_STEPS and draw(st.integers(0, 3)) == 0:
+        least, most = MIN_SLOW_INTERVAL_TICKS << 8, LONGEST_SLOW_TICKS << 8
+        interval = draw(st.integers(SLOW_INTERVAL_TICKS << 8, most))
+    else:
+        least, most = MIN_INTERVAL_TICKS << 8, (SLOW_INTERVAL_TICKS << 8) - 1
+        interval = draw(st.one_of(st.integers(least, least << 2), st.integers(least, most)))
+    unit = 1 if steps <= MAX_COARSE_STEPS else 256
+    room = (unit * (least - interval), unit * (most - interval)) if steps > 2 else (-(2**31), 2**31 - 1)
     share = max(steps - 2, 1)
     add = draw(st.integers(-(-room[0] // share), room[1] // share))
-    return Move(2 * steps + positive, first, interval, max(-(2**31), min(add, 2**31 - 1)))
+    bits = 31 if steps > MAX_COARSE_STEPS or interval >= SLOW_INTERVAL_TICKS << 8 else 23
+    return Move(2 * steps + positive, first, interval, max(-(2**bits), min(add, 2**bits - 1)))
 
 
 @st.composite

@@ -39,6 +39,7 @@ from planarm_wire.messages import (
     Config,
     Enable,
     Fault,
+    Move,
     Override,
     PinMap,
     Resume,
@@ -191,6 +192,69 @@ def test_override_from_the_start(native_firmware: NativeFirmware, motion: Holdab
     begin = round(player.board.rises(0)[0] - predicted[0][0])
     for joint in range(JOINTS):
         assert_predicted([tick - begin for tick in player.board.rises(joint)], predicted[joint])
+
+
+def slow_motion() -> HoldableMotion:
+    """Joint 2 makes slow moves, with some 80 to 230 steps/s, in segments of many slices; joint 1 5,300 steps/s."""
+    segments = []
+    for k in range(12):
+        slower = Move(2 * 7 + (k % 3 != 0), 400, (70_000 << 8) + 77, (5_000 << 8) + 3)
+        faster = Move(2 * 6 + (k % 3 != 0), 500, (195_000 << 8) + 1, -(40_500 << 8) - 1)
+        segments.append(segment_of(600_000, run_of(199, first=600, interval=3000), faster if k % 2 else slower))
+    heads = [(150, 150, 0)] * len(segments)
+    return HoldableMotion(end_motion(segments), heads, (0.0, 0.0), (40_000, 160_000))
+
+
+@pytest.mark.parametrize("percent", [1, 7, 50, 99])
+def test_slow_moves_under_an_override(native_firmware: NativeFirmware, percent: int) -> None:
+    motion = slow_motion()
+    player = Player(native_firmware, motion)
+    player.board.ask(Override(percent))
+    player.start()
+    player.assert_all_steps_made()
+    stretches = stretches_of(motion, target=100 * ONE // percent)
+    for joint in range(JOINTS):
+        predicted = stretched_steps(motion.segments, stretches, joint)
+        # A slice's length in ticks is rounded down, some ten a segment.
+        begin = round(player.board.rises(0)[0] - stretched_steps(motion.segments, stretches, 0)[0])
+        off = (0.15 * 3000, 0.0)[joint]
+        for tick, model in zip(player.board.rises(joint), predicted, strict=True):
+            assert -11 * (1 + model // 600_000) - TICKS_OFF <= tick - begin - model <= TICKS_OFF + off
+
+
+@pytest.mark.parametrize("wait", range(500_000, 900_000, 60_000))
+def test_a_slow_move_below_the_start_stop_speed_rests_at_once(firmware: Firmware, wait: int) -> None:
+    # Nearly every slice has a step; 60,000 ticks is the interval at the start-stop speed.
+    segment = segment_of(2_000_000, Move(2 * 29 + 1, 500, 65_600 << 8, 10 << 8))
+    head = (150, 150, 0)
+    player = Player(firmware, HoldableMotion(end_motion([segment] * 4), [head] * 4, (0.0,), (60_000, 60_000)))
+    player.start()
+    player.play_until(player.board.now + wait)
+    player.board.receive(bytes([HOLD_CODE]))
+    hold = player.board.now
+    player.play_until(player.board.now + 10**9, State.HELD)
+    assert player.board.now - hold < 80_000
+
+
+@settings(max_examples=20, deadline=None)
+@given(st.lists(st.integers(0, 1_500_000), min_size=1, max_size=4), st.integers(0, 300_000))
+def test_slow_moves_lose_no_step_when_held(native_firmware: NativeFirmware, waits: list[int], pause: int) -> None:
+    player = Player(native_firmware, slow_motion())
+    player.start()
+    for wait in waits:
+        player.play_until(player.board.now + wait)
+        player.board.receive(bytes([HOLD_CODE]))
+        if player.play_until(player.board.now + 10**9, State.HELD, State.READY).state is State.READY:
+            break
+        player.board.run(pause)
+        player.board.send(Resume())
+    player.assert_all_steps_made()
+    for joint in range(JOINTS):
+        rises = player.board.rises(joint)
+        planned = [tick for tick, _ in Schedule.of(player.motion.segments).steps[joint]]
+        assert len(rises) == len(planned)
+        # Slower than planned at times, never faster.
+        assert all(b - a >= q - p - 1 for (a, b), (p, q) in zip(pairwise(rises), pairwise(planned), strict=True))
 
 
 def test_at_full_rate_the_schedule_is_the_plan_bit_by_bit(firmware: Firmware) -> None:

@@ -64,7 +64,7 @@ def test_hand_made_segments_reach_the_pins_tick_by_tick(line):
     """Every number of the expected ticks is worked out by hand from the fields."""
     segments = (
         Segment(2 * 16_000, (Move(2 * 4 + 1, 1000, 2000 << 8), Move(0))),
-        Segment(2 * 20_000, (Move(2 * 3, 5000, 4000 << 8, 1000 << 16), Move(2 * 1 + 1, 777))),
+        Segment(2 * 20_000, (Move(2 * 3, 5000, 4000 << 8, 1000 << 8), Move(2 * 1 + 1, 777))),
         Segment(2 * 8_000 + 1, (Move(1), Move(2 * 3, 1600, (1000 << 8) + (1 << 7)))),
     )
     result = stream_plan(line, segments)
@@ -101,8 +101,8 @@ def test_two_plans_one_after_the_other(line):
 
 
 def test_the_line_carries_what_250000_baud_can(line):
-    """640 segments a second of about 21 bytes each: 15,000 of the line's 25,000 bytes a second with all overhead."""
-    segments = motion(400, ticks=25_000)
+    """700 segments a second of about 20 bytes each: 15,000 of the line's 25,000 bytes a second with all overhead."""
+    segments = motion(400, ticks=23_000)
     result = stream_plan(line, segments)
     assert_pins_show(line, segments)
     assert result.least_queued >= 8  # a quarter of the 33 such segments that the ring's bytes hold

@@ -156,7 +156,8 @@ def shorter_intervals(segments):
 
 def bent(segments):
     k = busy(segments)
-    return with_move(segments, k, 0, add_q16=segments[k].moves[0].add_q16 + 20 * 65536)
+    move = segments[k].moves[0]
+    return with_move(segments, k, 0, add=move.add + 20 * (256 if move.steps_dir >> 1 <= 128 else 65536))
 
 
 def doubled(segments):

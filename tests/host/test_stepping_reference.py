@@ -9,8 +9,8 @@ from planarm.stepping.table import segment_bytes, table_of
 from planarm_wire.messages import TICKS_HZ
 from reference_motion import least_held_ticks, reference_train
 
-QUEUE_HOLDS_S = {2: 0.250, 4: 0.066}
-"""By the number of joints. Four ask for 820 bytes to hold 0.120 s; uno_four has 552 of its 2 KiB left for them."""
+QUEUE_HOLDS_S = {2: 0.270, 4: 0.120}
+"""By the number of joints."""
 
 
 @pytest.mark.parametrize(("joints", "usteps_hz"), [(2, 20_000), (4, 15_000)])

@@ -16,18 +16,22 @@ from planarm.trajectory.timing import time_path
 from planarm_wire.codec import decode, encode
 from planarm_wire.messages import (
     BOARDS,
+    MAX_COARSE_STEPS,
     MAX_INTERVAL_TICKS,
     MAX_SEGMENT_STEPS,
     MAX_SEGMENT_TICKS,
     MIN_DIR_SETUP_TICKS,
     MIN_INTERVAL_TICKS,
+    MIN_SLOW_INTERVAL_TICKS,
+    SLOW_INTERVAL_TICKS,
     Segments,
 )
-from planarm_wire.steps import expand_moves
+from planarm_wire.steps import LONGEST_INTERVAL_TICKS, expand_moves
 from planarm_wire.wirings import board_of
 
 WITHOUT_FAST_MOTORS = Coding()
 MIN_REVERSAL_TICKS = least_reversal_ticks(BOARDS["uno"])
+LIMITS = (MIN_SLOW_INTERVAL_TICKS, MAX_INTERVAL_TICKS, LONGEST_INTERVAL_TICKS)
 NO_STEPS = JointSteps(np.zeros(0, np.int64), np.zeros(0, np.int8))
 
 
@@ -70,9 +74,13 @@ def check_everything(train, coding=WITHOUT_FAST_MOTORS):
             assert relative[0] >= 0
             assert relative[-1] < duration
             if count > 1:
-                ends = move.interval_q8 / 256, (256 * move.interval_q8 + (count - 2) * move.add_q16) / 65536
-                assert min(ends) >= MIN_INTERVAL_TICKS
-                assert max(ends) <= MAX_INTERVAL_TICKS
+                slow = move.interval_q8 >= SLOW_INTERVAL_TICKS << 8
+                unit = 256 if count <= MAX_COARSE_STEPS else 65536
+                assert -32768 <= move.add / unit < 32768 or slow
+                ends = move.interval_q8 / 256, move.interval_q8 / 256 + (count - 2) * move.add / unit
+                assert min(ends) >= (MIN_SLOW_INTERVAL_TICKS if slow else MIN_INTERVAL_TICKS)
+                assert max(ends) <= (LONGEST_INTERVAL_TICKS if slow else MAX_INTERVAL_TICKS)
+                assert count <= MAX_COARSE_STEPS or not slow
             if rest[j] is None:
                 assert begin + relative[0] >= MIN_DIR_SETUP_TICKS
             if rest[j] is not None:
@@ -132,7 +140,9 @@ def nasty_steps(draw):
         st.integers(0, 40),
         st.integers(0, 2000),
         st.integers(0, 200_000),
-        st.sampled_from([0, 320, MAX_INTERVAL_TICKS - MIN_INTERVAL_TICKS, 10**7]),
+        st.sampled_from(
+            [0, 320, *(longest - 800 for longest in LIMITS), *(longest - 799 for longest in LIMITS), 10**7]
+        ),
     )
     count = draw(st.integers(0, 60))
     spare = draw(st.lists(gap, min_size=count, max_size=count))
@@ -211,7 +221,11 @@ def random_nasty_steps(rng, board=BOARDS["uno"]):
     count = int(rng.integers(0, 60))
     directions = rng.choice([1, 1, 1, -1], count)
     spare = [
-        int(rng.choice([rng.integers(41), rng.integers(2001), rng.integers(200_001), rng.choice([0, 320, 59_680])]))
+        int(
+            rng.choice(
+                [rng.integers(41), rng.integers(2001), rng.integers(200_001), rng.choice([0, 320, 64_735, 261_343])]
+            )
+        )
         for _ in range(count)
     ]
     turns = np.diff(directions, prepend=directions[:1]) != 0

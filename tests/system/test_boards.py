@@ -38,7 +38,8 @@ def read_back(path):
     for segment in plan.segments:
         for motor, move in enumerate(segment.moves):
             for n in range(move.steps_dir >> 1):
-                since = (256 * n * move.interval_q8 + n * (n - 1) // 2 * move.add_q16) // 65536
+                add = 256 * move.add if move.steps_dir >> 1 <= 128 else move.add
+                since = (256 * n * move.interval_q8 + n * (n - 1) // 2 * add) // 65536
                 events.append((at + move.first_ticks + since, motor, 1 if move.steps_dir & 1 else -1))
         at += duration_ticks(segment)
     position, rows = list(plan.start_usteps), [list(plan.start_usteps)]

@@ -14,6 +14,7 @@ from planarm_wire.codec import decode, encode, encoded_bytes
 from planarm_wire.errors import WireError
 from planarm_wire.framing import FrameDecoder, encode_frame
 from planarm_wire.layout import EACH_JOINT, END, SCALARS, Field
+from planarm_wire.steps import LONGEST_INTERVAL_TICKS
 
 
 def values(field: Field) -> st.SearchStrategy[Any]:
@@ -136,7 +137,7 @@ REFUSED: dict[str, tuple[Any, str]] = {
     ),
     "deep inside": (
         m.Segments(0, 0, 0, (m.Segment(2, (REST, REST)), m.Segment(2, (REST, m.Move(4, 0, 0, 2**31))))),
-        "segments.segments[1].moves[1].add_q16: 2147483648 is outside -2147483648 .. 2147483647 (varint)",
+        "segments.segments[1].moves[1].add: 2147483648 is outside -2147483648 .. 2147483647 (varint)",
     ),
     "absent field is not 0": (
         m.Segments(0, 0, 0, (m.Segment(2, (m.Move(2, 0, 1), REST)),)),
@@ -218,12 +219,21 @@ def test_a_message_has_the_boards_number_of_joints(name: str) -> None:
         decode(*encode(status), other)
 
 
-MOVES = st.builds(
-    m.Move,
-    st.integers(4, 2 * m.MAX_SEGMENT_STEPS + 1),
-    st.integers(0, 2**21 - 1),
-    st.integers(m.MIN_INTERVAL_TICKS << 8, m.MAX_INTERVAL_TICKS << 8),
-    st.integers(-(2**27), 2**27 - 1),
+MOVES = st.one_of(
+    st.builds(
+        m.Move,
+        st.integers(4, 2 * m.MAX_SEGMENT_STEPS + 1),
+        st.integers(0, 2**21 - 1),
+        st.integers(m.MIN_INTERVAL_TICKS << 8, m.MAX_INTERVAL_TICKS << 8),
+        st.integers(-(2**27), 2**27 - 1),
+    ),
+    st.builds(  # slow: one interval is at most that much longer than the next
+        m.Move,
+        st.integers(4, 2 * m.MAX_COARSE_STEPS + 1),
+        st.integers(0, 2**21 - 1),
+        st.integers(m.SLOW_INTERVAL_TICKS << 8, LONGEST_INTERVAL_TICKS << 8),
+        st.integers(-LONGEST_INTERVAL_TICKS << 8, LONGEST_INTERVAL_TICKS << 8),
+    ),
 )
 
 

@@ -229,21 +229,27 @@ CASE(receiver_takes_no_payload_over_the_limit) {
 }
 
 CASE(last_tick_of_a_move_is_the_closed_form) {
-    for (int i = 0; i < 20000; ++i) {
+    for (int i = 0; i < 40000; ++i) {
+        const bool slow = i % 2 != 0;
+        const uint32_t most_steps = slow ? wire::MAX_COARSE_STEPS : wire::MAX_SEGMENT_STEPS;
+        // In a slow move everything counts 2^-8 ticks.
+        const int64_t least = slow ? static_cast<int64_t>(wire::MIN_SLOW_INTERVAL_TICKS) << 8
+                                   : static_cast<int64_t>(wire::MIN_INTERVAL_TICKS) << 16;
+        const int64_t begin = slow ? static_cast<int64_t>(wire::SLOW_INTERVAL_TICKS) << 8 : least;
+        const int64_t end = int64_t(1) << 32;
         Move move = {};
-        move.steps = static_cast<uint16_t>(1 + random_below(wire::MAX_SEGMENT_STEPS));
-        const int64_t least = static_cast<int64_t>(wire::MIN_INTERVAL_TICKS) << 16;
-        const int64_t most = static_cast<int64_t>(wire::MAX_INTERVAL_TICKS) << 16;
-        move.interval_q16 = static_cast<uint32_t>(
-            least + static_cast<int64_t>(random_bits() % static_cast<uint64_t>(most - least)));
-        const int64_t changes = move.steps > 2 ? move.steps - 2 : 1;
-        const int64_t last =
-            least + static_cast<int64_t>(random_bits() % static_cast<uint64_t>(most - least));
-        const int64_t add = (last - move.interval_q16) / changes;
+        move.slow = slow ? 1 : 0;
+        move.count = static_cast<uint16_t>(1 + random_below(most_steps));
+        move.interval = static_cast<uint32_t>(
+            begin + static_cast<int64_t>(random_bits() % static_cast<uint64_t>(end - begin)));
+        const int64_t changes = move.count > 2 ? move.count - 2 : 1;
+        const int64_t last = least + static_cast<int64_t>(random_bits() % static_cast<uint64_t>(end - least));
+        const int64_t add = (last - move.interval) / changes;
         if (add < INT32_MIN || add > INT32_MAX) continue;
-        move.add_q16 = static_cast<int32_t>(add);
-        const int64_t n = move.steps - 1;
-        const int64_t closed_form = n == 0 ? 0 : (n * move.interval_q16 + n * (n - 1) / 2 * add) >> 16;
+        move.add = static_cast<uint32_t>(static_cast<int32_t>(add));
+        const int64_t n = move.count - 1;
+        const int64_t closed_form =
+            n == 0 ? 0 : (n * move.interval + n * (n - 1) / 2 * add) >> (slow ? 8 : 16);
         CHECK(planarm::run_ticks(move) == closed_form);
     }
 }

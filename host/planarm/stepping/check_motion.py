@@ -13,7 +13,7 @@ from planarm.model.transmission import Transmission, motor_axes
 from planarm.scene import JointSpec, Scene
 from planarm.stepping.certificate import Check, at_most
 from planarm.stepping.poses import MotorPositions
-from planarm.stepping.quantise import TIMING_USTEPS, hysteresis_usteps
+from planarm.stepping.quantise import hysteresis_usteps, timing_usteps
 from planarm.stepping.train import Floats, StepTrain
 from planarm.trajectory.motion import Trajectory
 from planarm_wire.messages import TICKS_HZ
@@ -101,7 +101,10 @@ def check_deviation(trajectory: Trajectory, scene: Scene, made: StepTrain, at: M
     checks = []
     for number, axis in enumerate(motor_axes(scene.joints, scene.coupling), start=1):
         worst = int(np.argmax(deviation[:, number - 1]))
-        value, allowed = deviation[worst, number - 1], 0.5 + TIMING_USTEPS + hysteresis_usteps(axis, scene.board)
+        value, allowed = (
+            deviation[worst, number - 1],
+            0.5 + timing_usteps(scene.board) + hysteresis_usteps(axis, scene.board),
+        )
         where = f"{ticks[worst] / TICKS_HZ:.6f} s"
         checks.append(at_most(f"joint {number} deviation from the plan", value, allowed, "usteps", where))
     return checks

@@ -4,17 +4,17 @@ import numpy as np
 
 from planarm.scene import JointSpec
 from planarm.stepping.certificate import Check, at_least, at_most
-from planarm.stepping.train import JointSteps, StepTrain, least_reversal_ticks
+from planarm.stepping.train import JointSteps, StepTrain, least_reversal_ticks, timing_share
+from planarm_wire.boards import Board
 from planarm_wire.messages import TICKS_HZ
 
-TIMING_SHARE = 0.02
 TIMING_TICKS = 16
-"""Permitted error of a step's time: 1 us, or this share of the shorter interval around it if that is more."""
+"""Permitted error of a step's time: 1 us, or the board's share of the shorter interval around it if that is more."""
 
 STEP_PAIRS = 4.5
 """Square of the time between the points of a divided difference, in micro-steps over the acceleration's limit."""
-ACCELERATION_BLUR = 4.0 * 0.04 / STEP_PAIRS
-"""Share of the limit by which timing errors of 0.04 micro-steps, at the worst of all three points, change it."""
+ERROR_USTEPS = 2.0
+"""A step's timing error in micro-steps, in its share of the interval: where the speed is twice the mean."""
 
 
 def check_counts(train: StepTrain, made: StepTrain, number: int) -> list[Check]:
@@ -36,7 +36,7 @@ def check_counts(train: StepTrain, made: StepTrain, number: int) -> list[Check]:
     around = np.diff(wanted.ticks, prepend=-(1 << 62), append=1 << 62)
     shorter = np.minimum(around[:-1], around[1:])
     shorter = np.where(shorter > 1 << 60, 0, shorter)  # a lone step has no interval
-    allowed = np.maximum(TIMING_TICKS, np.floor(TIMING_SHARE * shorter))
+    allowed = np.maximum(TIMING_TICKS, np.floor(timing_share(train.board) * shorter))
     worst = int(np.argmax(error / allowed))
     where = _time(wanted.ticks[worst])
     return [*checks, at_most(f"{name} timing error", int(error[worst]), int(allowed[worst]), "ticks", where)]
@@ -63,11 +63,11 @@ def check_gaps(made: StepTrain, joints: tuple[JointSpec, ...], number: int) -> l
             at_least(f"joint {number} reversal time", gaps[least], limit, "ticks", _time(steps.ticks[least]), setting)
         )
     if len(gaps) > 1:
-        checks.append(_check_acceleration(steps, joint, number))
+        checks.append(_check_acceleration(steps, joint, number, made.board))
     return checks
 
 
-def _check_acceleration(steps: JointSteps, joint: JointSpec, number: int) -> Check:
+def _check_acceleration(steps: JointSteps, joint: JointSpec, number: int, board: Board) -> Check:
     """Check the acceleration that the steps themselves show.
 
     At each step the joint passes the middle between two micro-steps, at a known time. Three such points have a second
@@ -90,7 +90,8 @@ def _check_acceleration(steps: JointSteps, joint: JointSpec, number: int) -> Che
     acceleration = np.abs(2.0 * (slopes[1] - slopes[0]) / (t_s[2] - t_s[0]))
     worst = int(np.argmax(acceleration))
     where = _time(steps.ticks[at[worst]])
-    blurred = limit * ACCELERATION_BLUR
+    # By errors at the worst of all three points.
+    blurred = limit * 4.0 * ERROR_USTEPS * timing_share(board) / STEP_PAIRS
     return at_most(name, acceleration[worst], limit, "rad/s^2", where, setting, rounding=blurred, amber=limit)
 
 

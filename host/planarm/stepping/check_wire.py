@@ -12,10 +12,13 @@ from planarm.stepping.table import SegmentTable
 from planarm.stepping.train import StepTrain
 from planarm_wire.boards import Board
 from planarm_wire.messages import (
+    MAX_COARSE_STEPS,
     MAX_INTERVAL_TICKS,
     MAX_SEGMENT_STEPS,
     MAX_SEGMENT_TICKS,
+    MAX_SLOW_INTERVAL_TICKS,
     MIN_DIR_SETUP_TICKS,
+    MIN_SLOW_INTERVAL_TICKS,
 )
 from planarm_wire.steps import step_count
 
@@ -70,17 +73,17 @@ def _problems(table: SegmentTable) -> Iterator[str]:
     """Yield the wire's limits that segments break."""
     several = table.counts > 1
     inner = np.stack([table.interval_q16, table.last_interval_q16]) / 65536
-    least, most = inner.min(axis=0), inner.max(axis=0)
+    shortest, longest = inner.min(axis=0), inner.max(axis=0)
+    least = np.where(table.slow, MIN_SLOW_INTERVAL_TICKS, table.board.min_interval_ticks)
+    most = np.where(table.slow, MAX_SLOW_INTERVAL_TICKS, MAX_INTERVAL_TICKS)
+    add = np.where(table.slow, table.add, table.add_q16)  # that the device keeps in 32 bits
     outside = (table.first < 0) | (table.last_ticks < table.first) | (table.last_ticks >= table.durations[:, None])
     rules = (
         ((table.durations <= 0) | (table.durations > MAX_SEGMENT_TICKS), "duration {}", table.durations),
         (table.counts > MAX_SEGMENT_STEPS, "{} steps of joint {}", table.counts),
-        (
-            several & ((least < table.board.min_interval_ticks) | (most > MAX_INTERVAL_TICKS)),
-            "intervals of joint {1}",
-            table.counts,
-        ),
-        ((table.add_q16 < -(1 << 31)) | (table.add_q16 >= 1 << 31), "add of joint {1}", table.counts),
+        (table.slow & (table.counts > MAX_COARSE_STEPS), "{} slow steps of joint {}", table.counts),
+        (several & ((shortest < least) | (longest >= most + 1)), "intervals of joint {1}", table.counts),
+        (several & (np.abs(2 * add + 1) >> 32 > 0), "add of joint {1}", table.counts),
         ((table.counts > 0) & outside, "step of joint {1} outside the segment", table.counts),
     )
     for breaks, words, values in rules:

@@ -4,7 +4,8 @@ Each step has a window of allowed ticks. In real numbers T is a quadratic in n; 
 whose largest error, in window widths, is least. Its I is rounded to 2^-8 ticks, A to 2^-16, and only the exact
 expansion of these decides: it leaves a range for `first`, or none. Where the quadratic is inside all windows but an
 interval is too short or too long, as where a joint comes to or goes on at its top speed, that interval is held at its
-limit and the rest fitted.
+limit and the rest fitted. A slow move, one that begins with SLOW_INTERVAL_TICKS or more, has an A in 2^-8 ticks and
+limits of its own.
 """
 
 from math import floor
@@ -14,7 +15,13 @@ from numpy.typing import NDArray
 
 from planarm.stepping.chebyshev import best_polynomial
 from planarm_wire.kernel_cache import kernel
-from planarm_wire.messages import MAX_INTERVAL_TICKS
+from planarm_wire.messages import (
+    MAX_COARSE_STEPS,
+    MAX_INTERVAL_TICKS,
+    MIN_SLOW_INTERVAL_TICKS,
+    SLOW_INTERVAL_TICKS,
+)
+from planarm_wire.steps import COARSE_ADD_BITS, LONGEST_INTERVAL_TICKS
 
 Ticks = NDArray[np.int64]
 Floats = NDArray[np.float64]
@@ -26,6 +33,9 @@ UNIT_Q16 = 256
 """The wire's unit of the first interval."""
 LEAST_ADD = -(1 << 31)
 """The wire's add is a signed number of 32 bits."""
+COARSE_UNIT = 1 << COARSE_ADD_BITS
+"""Of the add of a run of few steps."""
+SLOW_Q16 = SLOW_INTERVAL_TICKS * ONE_Q16
 
 
 @kernel
@@ -47,24 +57,42 @@ def fit_run(low: Ticks, high: Ticks, least_interval: int) -> Fit:
         return placed(low, high, least_interval, apart * ONE_Q16, int(np.int64(0)))
     inside, interval, add = fitted(low, high)
     slower, faster = int(np.int64(1)), int(np.int64(-1))  # no literals: `fitted_held` would be compiled for each
+    (least, most), unit = limits_of(interval, least_interval), add_unit(steps)
     last = interval + (steps - 2) * add
-    if inside and min(interval, last) < least_interval * ONE_Q16:
-        inside, interval, add = fitted_held(low, high, least_interval, last < interval, slower)
-    elif inside and max(interval, last) > MAX_INTERVAL_TICKS * ONE_Q16:
-        inside, interval, add = fitted_held(low, high, int(np.int64(MAX_INTERVAL_TICKS)), last > interval, faster)
+    if inside and min(interval, last) < least * ONE_Q16:
+        inside, interval, add = fitted_held(low, high, least, last < interval, slower, unit)
+    elif inside and max(interval, last) > most * ONE_Q16:
+        inside, interval, add = fitted_held(low, high, most, last > interval, faster, unit)
     return placed(low, high, least_interval, interval, add) if inside else (False, 0, 0, 0)
+
+
+@kernel
+def limits_of(interval: int, least_interval: int) -> tuple[int, int]:
+    """Return (least, most), the limits in ticks of the intervals of a run that begins with this one."""
+    if interval >= SLOW_Q16:
+        return max(least_interval, MIN_SLOW_INTERVAL_TICKS), LONGEST_INTERVAL_TICKS
+    return least_interval, MAX_INTERVAL_TICKS
+
+
+@kernel
+def add_unit(steps: int) -> int:
+    """Return what the add of a run with so many steps counts, in 2^-16 ticks."""
+    return COARSE_UNIT if steps <= MAX_COARSE_STEPS else 1
 
 
 @kernel
 def placed(low: Ticks, high: Ticks, least_interval: int, interval: int, add: int) -> Fit:
     """Return the run with the given intervals that lies in all windows, expanded exactly, if there is one."""
     steps = low.shape[0]
+    least, most = limits_of(interval, least_interval)
     last_interval = interval + (steps - 2) * add
-    if steps > 1 and min(interval, last_interval) < least_interval * ONE_Q16:
+    if steps > 1 and min(interval, last_interval) < least * ONE_Q16:
         return False, 0, 0, 0
-    if steps > 1 and max(interval, last_interval) > MAX_INTERVAL_TICKS * ONE_Q16:
+    if steps > 1 and max(interval, last_interval) > most * ONE_Q16:
         return False, 0, 0, 0
-    if not LEAST_ADD <= add <= -LEAST_ADD - 1:
+    if interval >= SLOW_Q16 and steps > MAX_COARSE_STEPS:
+        return False, 0, 0, 0
+    if interval < SLOW_Q16 and not LEAST_ADD <= add < -LEAST_ADD:
         return False, 0, 0, 0
     earliest, latest = low[0], high[0]
     for n in range(1, steps):
@@ -94,9 +122,10 @@ def fit_smaller(low: Ticks, high: Ticks, least_interval: int, add: int) -> Fit:
         least_interval: as for `fit_run`.
         add: of a run that fits.
     """
-    limit = 64  # zigzag: one byte holds -64 .. 63
+    unit = add_unit(low.shape[0])
+    limit = 64 * unit  # zigzag: one byte holds -64 .. 63
     while low.shape[0] > 2 and not -limit <= add < limit:
-        smaller = limit - 1 if add > 0 else -limit
+        smaller = limit - unit if add > 0 else -limit
         inside, interval = fitted_line(low, high, smaller)
         if inside:
             found, first, interval, smaller = placed(low, high, least_interval, interval, smaller)
@@ -130,17 +159,22 @@ def fitted(low: Ticks, high: Ticks) -> tuple[bool, int, int]:
     inside, nodes, newton = best_polynomial(at, center, half, 2)
     # c0 + c1 (n - n0) + c2 (n - n0) (n - n1), written with n and n (n - 1) / 2
     interval, add = newton[1] + newton[2] * (1.0 - nodes[0] - nodes[1]), 2.0 * newton[2]
+    # What rounding the one with the larger unit tilts is taken back by the other, so that both ends of the run stay.
+    unit = add_unit(steps)
+    if unit > 1:
+        add_q16 = unit * floor(add * (ONE_Q16 // unit) + 0.5)
+        interval += 0.5 * (steps - 2) * (add - add_q16 / ONE_Q16)
+        return inside, UNIT_Q16 * floor(interval * (ONE_Q16 // UNIT_Q16) + 0.5), add_q16
     interval_q16 = UNIT_Q16 * floor(interval * (ONE_Q16 // UNIT_Q16) + 0.5)
-    # What rounding I tilts is taken back by A, so that both ends of the run stay.
     tilted = interval - interval_q16 / ONE_Q16
     return inside, interval_q16, floor((add + 2.0 * tilted / (steps - 2)) * ONE_Q16 + 0.5)
 
 
 @kernel
-def fitted_held(low: Ticks, high: Ticks, held: int, at_end: bool, sense: int) -> tuple[bool, int, int]:
+def fitted_held(low: Ticks, high: Ticks, held: int, at_end: bool, sense: int, unit: int) -> tuple[bool, int, int]:
     """Return (inside, interval_q16, add_q16) of the best quadratic whose first, or last, interval is `held`.
 
-    Away from there the intervals grow (sense 1) or shrink (-1), or stay.
+    Away from there the intervals grow (sense 1) or shrink (-1), or stay, by whole units.
 
     By convexity, where the best quadratic breaks a limit of the intervals, the best that keeps it stands on the limit.
     Counted from the held end, what the held interval leaves of the times is a straight line over n (n - 1) / 2. The two
@@ -160,9 +194,9 @@ def fitted_held(low: Ticks, high: Ticks, held: int, at_end: bool, sense: int) ->
             at[n - 1], center[n - 1], half[n - 1] = 0.5 * n * (n - 1.0), middle, width
     at[0], center[0], half[0] = 0.0, 0.5 * (bottom + top), max(0.5, 0.5 * (top - bottom))
     inside, _, newton = best_polynomial(at, center, half, 1)
-    grows = sense * max(0, sense * floor(newton[1] * ONE_Q16 + 0.5))
+    grows = unit * sense * max(0, sense * floor(newton[1] * (ONE_Q16 // unit) + 0.5))
     if at_end:
-        # Whole units, on the held limit's right side.
+        # Whole 2^-8 ticks, on the held limit's right side.
         units = -(-sense * (held * ONE_Q16 + (steps - 2) * grows) // UNIT_Q16)
         return inside, sense * units * UNIT_Q16, -grows
     return inside, held * ONE_Q16, grows

@@ -8,7 +8,7 @@ joint's next step can still be made, at the latest in its window. So one step of
 import numpy as np
 from numpy.typing import NDArray
 
-from planarm.stepping.fit import fit_run, fit_smaller
+from planarm.stepping.fit import add_unit, fit_run, fit_smaller
 from planarm.stepping.windows import FAST, GAP, HIGH, LOW, RUN_END, SETUP, TICK, Windows
 from planarm_wire.kernel_cache import kernel
 from planarm_wire.messages import MAX_SEGMENT_TICKS
@@ -150,8 +150,9 @@ def charge(windows: Windows, following: Ticks, last: Ticks, begin: int, end: int
         if count > 0:
             shorten(windows, n, last[j], begin, end, runs[j], windows.least_interval[j])
         if count > 1:
-            add = runs[j, ADD]
-            total += varuint_bytes(runs[j, INTERVAL] >> 8) + varuint_bytes(2 * add if add >= 0 else -2 * add - 1)
+            interval, add = runs[j, INTERVAL], runs[j, ADD]
+            add //= add_unit(count)
+            total += varuint_bytes(interval >> 8) + varuint_bytes(2 * add if add >= 0 else -2 * add - 1)
         n += count
         if n < windows.first[j + 1]:
             total += varuint_bytes(max(windows.steps[n, SETUP], windows.steps[n, LOW] - end))

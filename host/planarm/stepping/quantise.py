@@ -30,17 +30,17 @@ from planarm.stepping.train import (
     nearest_usteps,
     require_steppable,
     slower,
+    timing_share,
 )
 from planarm.trajectory.motion import Trajectory
 from planarm_wire.boards import Board
 from planarm_wire.messages import MIN_DIR_SETUP_TICKS, TICKS_HZ
 from planarm_wire.wirings import OWN, board_of
 
-__all__ = ["JointSteps", "StepTrain", "hysteresis_usteps", "quantisation_bound_cm", "quantise"]
+__all__ = ["JointSteps", "StepTrain", "hysteresis_usteps", "quantisation_bound_cm", "quantise", "timing_usteps"]
 
-TIMING_USTEPS = 0.045
-"""How far a step's timing tolerance can move a joint: 2 % of an interval, where the speed at the step is at most twice
-the mean (rest at the other end), and the rounding to whole ticks of intervals of 320 or more."""
+ROUNDING_USTEPS = 0.005
+"""How far the rounding to whole ticks can move a joint, with intervals of 320 or more."""
 
 SUBDIVISION = 4
 """Parts of each interval of the trajectory in which the angles are searched for turning points."""
@@ -91,7 +91,16 @@ def quantisation_bound_cm(arm: Arm, joints: Sequence[JointSpec], coupling: Matri
     Half a micro-step and the steps' timing tolerance of each motor, at its lever.
     """
     levers_cm = Transmission.from_joints(joints, coupling).levers_cm(arm.link_lengths_cm)
-    return float((0.5 + TIMING_USTEPS) * levers_cm.sum())
+    return float((0.5 + timing_usteps(board_of(len(joints)))) * levers_cm.sum())
+
+
+def timing_usteps(board: Board) -> float:
+    """Return how far a step's timing tolerance can move a joint.
+
+    Its share of an interval, where the speed at the step is at most twice the mean (rest at the other end), and the
+    rounding to whole ticks.
+    """
+    return 2.0 * timing_share(board) + ROUNDING_USTEPS
 
 
 def hysteresis_usteps(joint: JointSpec, board: Board) -> float:

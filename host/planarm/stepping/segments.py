@@ -12,6 +12,7 @@ from planarm.stepping.plan import SegmentPlan
 from planarm.stepping.train import StepTrain, Ticks, require_steppable
 from planarm.stepping.windows import EXACT_TO_1_US, Coding, tolerance_ticks, windows_of
 from planarm_wire.messages import Move, Segment
+from planarm_wire.steps import move_of
 
 __all__ = ["Coding", "SegmentPlan", "compress", "expand"]
 
@@ -56,7 +57,7 @@ def _segments(train: StepTrain, made: Sequence[int], borders: Sequence[int], run
         for j, run in enumerate(runs[k].tolist()):
             count = run[COUNT]
             positive = count > 0 and train.steps[j].directions[following[j]] > 0
-            moves.append(Move(2 * count + int(positive), run[FIRST], run[INTERVAL] >> 8, run[ADD]))
+            moves.append(move_of(count, positive, run[FIRST], run[INTERVAL] >> 8, run[ADD]))
             following[j] += count
         is_last = k == len(runs) - 1
         segments.append(Segment(2 * (end - begin) + int(is_last), (*moves, *resting)))

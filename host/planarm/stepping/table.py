@@ -3,10 +3,13 @@
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from planarm.stepping.plan import SegmentPlan
 from planarm.stepping.train import Ticks
 from planarm_wire.boards import Board
+from planarm_wire.messages import MAX_COARSE_STEPS, SLOW_INTERVAL_TICKS
+from planarm_wire.steps import COARSE_ADD_BITS
 
 
 class SegmentTable(NamedTuple):
@@ -18,9 +21,20 @@ class SegmentTable(NamedTuple):
     positive: Ticks
     first: Ticks
     interval_q16: Ticks
-    add_q16: Ticks
+    add: Ticks
+    """As on the wire."""
     board: Board
     """That is to execute them."""
+
+    @property
+    def slow(self) -> NDArray[np.bool_]:
+        """Whether a move is slow."""
+        return np.asarray((self.counts > 1) & (self.interval_q16 >= SLOW_INTERVAL_TICKS << 16))
+
+    @property
+    def add_q16(self) -> Ticks:
+        """What each interval has more than the one before; what 32 bits do not hold is beyond the wire's limits."""
+        return np.where(self.counts <= MAX_COARSE_STEPS, self.add << COARSE_ADD_BITS, self.add)
 
     @property
     def last_interval_q16(self) -> Ticks:
@@ -45,7 +59,7 @@ def table_of(plan: SegmentPlan) -> SegmentTable:
     joints = len(plan.start_usteps)
     flags = np.array([segment.duration_flags for segment in plan.segments], np.int64)
     rows = [
-        (move.steps_dir, move.first_ticks, move.interval_q8 << 8, move.add_q16)
+        (move.steps_dir, move.first_ticks, move.interval_q8 << 8, move.add)
         for segment in plan.segments
         for move in segment.moves[:joints]
     ]
@@ -59,7 +73,8 @@ def segment_bytes(table: SegmentTable) -> Ticks:
     size = _varuint_bytes(2 * table.durations + table.is_last)
     some, several = table.counts > 0, table.counts > 1
     moves = _varuint_bytes(2 * table.counts + table.positive) + some * _varuint_bytes(table.first)
-    zigzag = np.where(table.add_q16 >= 0, 2 * table.add_q16, -2 * table.add_q16 - 1)
+    add = table.add
+    zigzag = np.where(add >= 0, 2 * add, -2 * add - 1)
     moves = moves + several * (_varuint_bytes(table.interval_q16 >> 8) + _varuint_bytes(zigzag))
     resting = table.board.joints - table.counts.shape[1]  # a byte each
     total: Ticks = size + moves.sum(axis=1) + resting

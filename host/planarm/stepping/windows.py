@@ -13,16 +13,17 @@ from typing import NamedTuple, Self
 import numpy as np
 
 from planarm.scene import JointSpec
-from planarm.stepping.train import Directions, JointSteps, StepTrain, Ticks, least_reversal_ticks
+from planarm.stepping.train import Directions, JointSteps, StepTrain, Ticks, least_reversal_ticks, timing_share
 from planarm_wire.boards import Board
 from planarm_wire.kernel_cache import kernel
 from planarm_wire.messages import (
-    MAX_INTERVAL_TICKS,
     MAX_SEGMENT_STEPS,
     MIN_DIR_SETUP_TICKS,
     SLICE_TICKS,
     TICKS_HZ,
 )
+from planarm_wire.steps import LONGEST_INTERVAL_TICKS
+from planarm_wire.wirings import board_of
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,7 +32,7 @@ class Coding:
 
     A step may be moved by the greater of `share` of the shorter interval around it and `ticks`, the latter at most
     `most_share` of that interval: 1 us is much where steps are 20 us apart, and the arm's distance from the plan,
-    `planarm.stepping.quantise.TIMING_USTEPS`, has to hold there, too.
+    `planarm.stepping.quantise.timing_usteps`, has to hold there, too.
 
     Attributes:
         ticks: 16 are 1 us.
@@ -50,8 +51,9 @@ class Coding:
 
     @classmethod
     def of(cls, axes: Sequence[JointSpec]) -> Self:
-        """Return the coding for motors with these axes' accelerations."""
-        return cls(start_stop_ticks=tuple(start_stop_ticks(axis) for axis in axes))
+        """Return the coding for motors with these axes' accelerations, on the board of so many."""
+        share = timing_share(board_of(len(axes)))
+        return cls(share=share, start_stop_ticks=tuple(start_stop_ticks(axis) for axis in axes))
 
 
 def start_stop_ticks(axis: JointSpec) -> int:
@@ -133,7 +135,7 @@ def _tighten(ticks: Ticks, directions: Directions, least_interval: int, reversal
         if n + 1 < count:
             steps[n, HIGH] = min(steps[n, HIGH], steps[n + 1, HIGH] - steps[n + 1, GAP])
         ends = n + 1 == count or directions[n + 1] != directions[n]
-        ends = ends or steps[n + 1, LOW] - steps[n, HIGH] > MAX_INTERVAL_TICKS
+        ends = ends or steps[n + 1, LOW] - steps[n, HIGH] > LONGEST_INTERVAL_TICKS
         steps[n, RUN_END] = n + 1 if ends else steps[n + 1, RUN_END]
     for n in range(count):
         steps[n, RUN_END] = min(steps[n, RUN_END], n + MAX_SEGMENT_STEPS)

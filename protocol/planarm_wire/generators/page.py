@@ -56,19 +56,21 @@ All numbers are little-endian.
 - A field whose condition does not hold is left out, and counts as 0."""
 
 _STEPS = """\
-For a `move` with N = `steps_dir` >> 1 steps, I = `interval_q8` and A = `add_q16`, step n rises
+For a `move` with N = `steps_dir` >> 1 steps, I = `interval_q8` and A = `add`, step n rises
 
     T_n = first_ticks + floor((256 n I + n (n - 1) / 2 A) / 2^16)        n = 0 .. N - 1
 
 ticks after the start of its segment, computed in exact integers (64 bits are enough; floor rounds towards minus
-infinity). So the interval from step n to step n + 1 is 256 I + n A, in 2^-16 ticks. The first segment of a motion
-starts `lead_ticks` after START is carried out, and every other one where the segment before it ends:
-B_(k+1) = B_k + duration.
+infinity). So the interval from step n to step n + 1 is 256 I + n A, in 2^-16 ticks. A is `add` where
+N > {max_coarse_steps}, else 256 x `add`. A move with I >= {slow_interval_ticks} x 2^8 is slow; in any other A is a
+signed number of 32 bits: 256 x `add` is taken modulo 2^32. The first segment of a motion starts `lead_ticks` after
+START is carried out, and every other one where the segment before it ends: B_(k+1) = B_k + duration.
 
 A segment is good when all of this holds for each joint; anything else latches `bad_segment`:
 
 - 1 <= duration <= {max_segment_ticks}, N <= {max_segment_steps}, and T_n < duration for every n;
-- {min_interval_ticks} x 2^16 <= 256 I + n A <= {max_interval_ticks} x 2^16 for n = 0 .. N - 2;
+- {min_interval_ticks} x 2^16 <= 256 I + n A < 2^32 for n = 0 .. N - 2; in a slow move
+  {min_slow_interval_ticks} x 2^16 <= 256 I + n A < 2^40, and N <= {max_coarse_steps};
 - its first step comes at least {min_interval_ticks} ticks after the joint's last step in the segments before, and at
   least {min_reversal_ticks} after it where the direction changes (`min_interval_ticks` + `min_dir_setup_ticks`).
 

@@ -20,8 +20,8 @@ from planarm_wire.steps import expand_moves
 
 _STUFFED_U32: Final = 0x7B7C7D7E  # every byte must be escaped
 _REST: Final = m.Move(0)
-_RAMP_UP: Final = m.Move(2 * 5 + 1, 100, 2000 << 8, -(100 << 16))
-_RAMP_DOWN: Final = m.Move(2 * 4, 0, (1000 << 8) + 1, 0x8001)
+_RAMP_UP: Final = m.Move(2 * 5 + 1, 100, 2000 << 8, -(100 << 8))
+_RAMP_DOWN: Final = m.Move(2 * 4, 0, (1000 << 8) + 1, 0x81)
 _ALL_STUFFED: Final = m.Move(0x7D, 0x7C, 0x7B, 0x3E)  # the last is 0x7C after zigzag
 _EXTREME: Final = m.Move(2 * m.MAX_SEGMENT_STEPS + 1, m.MAX_SEGMENT_TICKS, m.MAX_INTERVAL_TICKS << 8, -(2**31))
 
@@ -41,6 +41,10 @@ _SEGMENTS: Final[tuple[m.Segment, ...]] = (
     # A fraction of a tick: the floor of a falling sum, and a sum that passes 32 bits.
     m.Segment(2 * 400_000 + 1, (m.Move(2 * 40, 7, (9_000 << 8) + 5, -13), m.Move(2 * 7 + 1, 3, 59_999 << 8, 1))),
     m.Segment(2 * 12_000_000, (m.Move(2 * 300 + 1, 799, 39_900 << 8, -0x123456), m.Move(2, 11_999_999))),
+    # The most steps whose add counts 2^-8 ticks, and one more. Slow moves; the interval before they begin.
+    m.Segment(2 * 200_000, (m.Move(2 * 128, 5, 1_000 << 8, 3), m.Move(2 * 129 + 1, 5, 1_000 << 8, 3))),
+    m.Segment(2 * 400_000, (m.Move(2 * 6, 5, 65_536 << 8, -129), m.Move(2 * 6 + 1, 5, (65_536 << 8) - 1, -129))),
+    m.Segment(2 * 900_000, (m.Move(2 * 9 + 1, 320, 131_072 << 8, -((98_304 << 8) // 7)), _REST)),
 )
 
 _MESSAGES: Final[tuple[m.Message, ...]] = (

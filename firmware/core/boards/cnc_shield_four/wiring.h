@@ -12,7 +12,7 @@ namespace wire {
 // Joints that segments and ledger tell of.
 constexpr uint8_t JOINTS = 4;
 // Bytes of queued segments it holds; a SEGMENTS frame takes its payload and queue_frame_bytes.
-constexpr uint16_t QUEUE_BYTES = 552U;
+constexpr uint16_t QUEUE_BYTES = 582U;
 // Least time between two steps of one joint.
 constexpr uint16_t MIN_INTERVAL_TICKS = 1280U;
 // Least high time of a step pulse.
