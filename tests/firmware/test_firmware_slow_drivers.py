@@ -250,4 +250,4 @@ def test_a_turn_keeps_dir_from_the_pulse(firmware: EmulatedFirmware, sized: Call
 def test_its_receive_interrupt_is_the_same() -> None:
     tracer = Tracer(IMAGE, UNO_SLOW)
     Board(tracer).hello()
-    assert tracer.taken(RECEIVE) == {40}
+    assert tracer.taken(RECEIVE) == {36}

@@ -19,12 +19,15 @@ constexpr uint32_t BAUD_DIVIDER = TICKS_HZ / (8 * BAUD);  // double speed, ATmeg
 static_assert(BAUD_DIVIDER * 8 * BAUD == TICKS_HZ, "the baud rate must be exact");
 static_assert((RX_RING_BYTES & (RX_RING_BYTES - 1)) == 0, "ring indices wrap by a mask");
 
-uint8_t ring[RX_RING_BYTES];  // written by the interrupt
+// Written by the interrupt. At a multiple of 256 (image.ld), so that an index is the address's low byte.
+alignas(RX_RING_BYTES) uint8_t ring[RX_RING_BYTES];
 
-// Received bytes and bytes taken, the emergency bytes in a row, and bytes lost in the USART, all modulo 256,
-// where IN and OUT reach them: timer 0 stands still. A boot loader may have left anything there.
+// The place of the byte received last, that of the first which finds no room (RX_RING_BYTES behind the one to
+// be taken next), the emergency bytes in a row, counted from the high byte of the ring's address, and bytes
+// lost in the USART, all modulo 256, where IN and OUT reach them: timer 0 stands still. A boot loader may
+// have left anything there.
 #define RING_HEAD GPIOR2
-#define RING_TAIL OCR0A
+#define RING_LIMIT OCR0A
 #define EMERGENCY_RUN OCR0B
 #define OVERRUNS TCNT0
 
@@ -45,9 +48,9 @@ uint8_t reply[MAX_REPLY_BYTES];
 
 void serial_init() {
     TCCR0B = 0;
-    RING_HEAD = 0;
-    RING_TAIL = 0;
-    EMERGENCY_RUN = 0;
+    RING_HEAD = static_cast<uint8_t>(-1);
+    RING_LIMIT = RX_RING_BYTES;
+    EMERGENCY_RUN = static_cast<uint8_t>(reinterpret_cast<uintptr_t>(ring) >> 8);
     OVERRUNS = 0;
     UBRR0 = BAUD_DIVIDER - 1;
     UCSR0A = _BV(U2X0);
@@ -57,17 +60,17 @@ void serial_init() {
 
 // The ring's bytes are not volatile: those behind the head are the interrupt's, the others are not written.
 SerialBytes serial_peek() {
-    const uint8_t tail = RING_TAIL;
-    const uint8_t count = static_cast<uint8_t>(RING_HEAD - tail);
+    const uint8_t limit = RING_LIMIT;
+    const uint8_t count = static_cast<uint8_t>(RING_HEAD - limit + (RX_RING_BYTES + 1));
     compiler_barrier();
-    const uint8_t at = tail & (RX_RING_BYTES - 1);
+    const uint8_t at = limit & (RX_RING_BYTES - 1);
     const uint8_t together = static_cast<uint8_t>(RX_RING_BYTES - at);
     return {ring + at, count < together ? count : together};
 }
 
 void serial_drop(uint8_t count) {
     compiler_barrier();
-    RING_TAIL = static_cast<uint8_t>(RING_TAIL + count);
+    RING_LIMIT = static_cast<uint8_t>(RING_LIMIT + count);
 }
 
 bool serial_can_send() { return sending_at == 0; }
@@ -102,11 +105,11 @@ static_assert(_SFR_MEM_ADDR(OCR1B) == _SFR_MEM_ADDR(TCCR1A) + 10, "%[tccra] + 10
 
 // The interrupts, in assembler with registers that no other code uses: see step_interrupts.cpp.
 
-// Cycles with entry and jump: 40 for a byte stored or one that finds no room, 44 after an overrun, 32 for a
-// hold and for an emergency byte that is not the last. A byte comes every 640 at the fastest. Bytes lost
-// before a hold or an emergency byte are not counted. The last emergency byte, after which no step comes that
-// could be late, takes 108, with pulses of 15 us 294: no pin rises from the 32nd on, and those that are high
-// then fall the least high time later.
+// Cycles with entry and jump: 36 for a byte stored, 40 for one that finds no room, 42 after an overrun, 35
+// for a hold, 34 for an emergency byte that is not the last. A byte comes every 640 at the fastest. Bytes
+// lost before a hold or an emergency byte are not counted. The last emergency byte, after which no step comes
+// that could be late, takes 108, with pulses of 15 us 294: no pin rises from the 32nd on, and those that are
+// high then fall the least high time later.
 ISR(USART_RX_vect, ISR_NAKED) {
     __asm__ __volatile__(
         R"(
@@ -114,31 +117,27 @@ ISR(USART_RX_vect, ISR_NAKED) {
         movw r4, r30
         lds  r3, %[status]              ; before the byte, which moves it on
         lds  r30, %[data]
-        mov  r8, r30
+        mov  r6, r30
         subi r30, %[special]
         cpi  r30, 2
         brlo 4f
         in   r30, %[head]
-        in   r31, %[tail]
-        sub  r31, r30
-        cpi  r31, lo8(-(%[size]))
+        in   r31, %[limit]
+        inc  r30
+        cp   r30, r31
         breq 2f
-        mov  r9, r30
-        inc  r9
-        out  %[head], r9
+        out  %[head], r30
         andi r30, %[size] - 1
-        ldi  r31, 0
+        ldi  r31, hi8(%[ring])
         out  %[run], r31
-        subi r30, lo8(-(%[ring]))
-        sbci r31, hi8(-(%[ring]))
-        st   Z, r8
+        st   Z, r6
     1:  sbrc r3, %[overrun]
         rjmp 3f
-        movw r30, r4
+    9:  movw r30, r4
         out  %[sreg], r2
         reti
 
-    2:  ldi  r31, 0                     ; no room
+    2:  ldi  r31, hi8(%[ring])          ; no room
         out  %[run], r31
         lds  r30, %[full]
         inc  r30
@@ -148,28 +147,23 @@ ISR(USART_RX_vect, ISR_NAKED) {
     3:  in   r30, %[overruns]
         inc  r30
         out  %[overruns], r30
-        movw r30, r4
-        out  %[sreg], r2
-        reti
+        rjmp 9b
 
     4:  tst  r30                        ; out of band
         brne 6f
-        out  %[run], r30                ; hold
+        ldi  r31, hi8(%[ring])          ; hold
+        out  %[run], r31
         lds  r30, %[holds]
         inc  r30
         sts  %[holds], r30
-        movw r30, r4
-        out  %[sreg], r2
-        reti
+        rjmp 9b
 
     6:  in   r30, %[run]                ; emergency
         inc  r30
         out  %[run], r30
-        cpi  r30, %[repeats]
+        cpi  r30, hi8(%[ring] + %[repeats] * 256)
         brsh 7f
-        movw r30, r4
-        out  %[sreg], r2
-        reti
+        rjmp 9b
 
     7:  ldi  r30, %[line]
         mov  r3, r30
@@ -199,7 +193,7 @@ ISR(USART_RX_vect, ISR_NAKED) {
         reti
         )" ::[sreg] "I"(_SFR_IO_ADDR(SREG)),
         [status] "i"(&UCSR0A), [data] "i"(&UDR0), [overrun] "i"(DOR0), [special] "M"(planarm::FIRST_SPECIAL),
-        [head] "I"(_SFR_IO_ADDR(RING_HEAD)), [tail] "I"(_SFR_IO_ADDR(RING_TAIL)),
+        [head] "I"(_SFR_IO_ADDR(RING_HEAD)), [limit] "I"(_SFR_IO_ADDR(RING_LIMIT)),
         [run] "I"(_SFR_IO_ADDR(EMERGENCY_RUN)), [ring] "i"(hal::ring), [size] "i"(hal::RX_RING_BYTES),
         [full] "i"(&hal::ring_full), [overruns] "I"(_SFR_IO_ADDR(OVERRUNS)), [holds] "i"(&hal::holds),
         [repeats] "M"(planarm::wire::EMERGENCY_REPEATS), [all_disarmed] "i"(hal::ALL_DISARMED),

@@ -13,9 +13,9 @@
 //   on in one direction       75       56              58                69
 //   on and back               77       56              59                71
 //   going idle                73       56
-//   a step missed             82
+//   a step missed             82, of joint 2 84
 // tests/firmware/test_firmware_cycles.py counts them. The least interval of one joint covers what may run
-// when its step rises: what is left of a receive interrupt that has begun (39), a lock of the main program
+// when its step rises: what is left of a receive interrupt without room (39), a lock of the main program
 // (11), the other joint's interrupt (in a turn 77), the one instruction that comes between two interrupts
 // (2), its own way to the look at the timer (58), and what that asks for (38): 225, all of it. So a lock and
 // the two instructions behind it may take 13 cycles: tests/firmware/test_release.py looks at each.
@@ -44,6 +44,7 @@ static_assert(static_cast<uint8_t>(Chain::REVERSED) == 2, "bit 1 finds a reversa
 static_assert(_SFR_MEM_ADDR(TCCR1C) == _SFR_MEM_ADDR(TCCR1A) + 2, "%[tccra] + 2");
 static_assert(_SFR_MEM_ADDR(TCNT1) == _SFR_MEM_ADDR(TCCR1A) + 4, "%[tccra] + 4");
 static_assert(_SFR_MEM_ADDR(TIMSK2) == _SFR_MEM_ADDR(TIMSK1) + 1, "%[timsk] + 1");
+static_assert(_BV(FOC1B) == 0x40, "%[foc] tells joint 2");
 static_assert(hal::ONLY_LAPS == 1, "what a missed step leaves on");
 static_assert(sizeof(Run*) == 2 && sizeof(bool) == 1, "widths of loads");
 // At a turn DIR's port is read before the pulse falls and written after it.
@@ -112,8 +113,7 @@ HAL_INLINE void step_interrupt() {
         .endif
         lds  r30, %[tccra] + 4          ; late?
         lds  r31, %[tccra] + 5
-        subi r30, lo8(-(%[step_margin]))
-        sbci r31, hi8(-(%[step_margin]))
+        adiw r30, %[step_margin]
         cp   r6, r30
         cpc  r7, r31
         brmi 5f
@@ -170,7 +170,12 @@ HAL_INLINE void step_interrupt() {
         cpc  r7, r31
         brpl 9b
 
-    5:  lds  r30, %[timsk]              ; a step is missed
+    5:
+        .if %[foc] == 0x40               ; a step is missed: joint 1 has it
+        rjmp .Lmissed_step
+        .else
+    .Lmissed_step:
+        lds  r30, %[timsk]
         .if %[joints] > 2
         lds  r31, %[scheduled_on]
         or   r30, r31
@@ -188,6 +193,7 @@ HAL_INLINE void step_interrupt() {
         movw r30, r4
         out  %[sreg], r2
         reti
+        .endif
 
     4:  rjmp .+0                        ; go idle
         .if %[by_match]
