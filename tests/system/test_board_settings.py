@@ -20,8 +20,8 @@ from planarm.pipeline import plan_scene
 from planarm.record.look import judge_emulated_arm, judge_pins
 from planarm.scene import BoardSpec, LimitSwitchSpec, load_scene
 from planarm.streaming.plan_stream import options_for, stream
-from planarm.streaming.standing import look_and_configure, pose_of, tell, usteps_at
-from planarm_wire.messages import Clear, Enable, Fault, Query, State
+from planarm.streaming.standing import look, look_and_configure, pose_of, require_standing, tell, usteps_at
+from planarm_wire.messages import EMERGENCY_CODE, Clear, Enable, Fault, Query, State
 
 SCENE = Path(__file__).resolve().parents[1] / "scenarios" / "arm.toml"
 PORT = "/dev/ttyUNO"
@@ -183,8 +183,8 @@ def test_a_jog_onto_a_switch_is_warned_of_before_and_then_ends_with_its_fault(pl
     assert [text.split(" on the way")[0] for text in said] == ["joint 2 presses its limit switch"]
 
 
-def upright(scene):
-    return replace(scene, mechanics=replace(scene.mechanics, gravity=True, end_masses_kg=(0.0, 0.1)))
+def upright(scene, tip_kg=0.1):
+    return replace(scene, mechanics=replace(scene.mechanics, gravity=True, end_masses_kg=(0.0, tip_kg)))
 
 
 def with_switches_near(scene, usteps):
@@ -245,3 +245,73 @@ def test_a_board_that_lost_its_place_in_an_emergency_is_not_believed(plan, posit
     line.uno.pin("A0").drive(0)
     request(line, open_session(line), Clear())
     assert look_and_configure(line, PORT, stopping, positions).how is None, "also after the fault was cleared"
+
+
+def held_upright(plan, positions, **settings):
+    """A board that was told where its upright arm stands, and holds it."""
+    start = plan.segments.start_usteps
+    scene = replace(upright(with_switches_near(plan.scene, start), tip_kg=0.05), board_spec=BoardSpec(**settings))
+    line = line_to(scene, start)
+    line.clock.wait_until(0.05)
+    tell(line, PORT, scene, positions, start, "zeroed")
+    assert line.uno.pin(ENABLE).level == 0, "an arm that would fall is held from when its place is told"
+    assert look_and_configure(line, PORT, scene, positions).how == "zeroed"
+    return line, scene
+
+
+def test_an_arm_that_fell_when_its_idle_drivers_were_released_is_not_believed(plan, positions):
+    line, scene = held_upright(plan, positions, idle_release_s=5.0)
+    line.arm.settle(6.0)
+    assert line.uno.pin(ENABLE).level == 1
+    standing = look_and_configure(line, PORT, scene, positions)
+    assert standing.how is None
+    with pytest.raises(LinkError, match="released its drivers, without which this arm would fall"):
+        require_standing(standing, scene, plan.segments.start_usteps)
+
+
+def test_an_arm_that_lies_flat_stays_where_its_idle_drivers_left_it(plan, positions):
+    scene, start = with_board(plan, idle_release_s=5.0), plan.segments.start_usteps
+    line = line_to(scene, start)
+    line.clock.wait_until(0.05)
+    tell(line, PORT, scene, positions, start, "zeroed")
+    assert line.uno.pin(ENABLE).level == 1, "nobody asked for its drivers"
+    request(line, look_and_configure(line, PORT, scene, positions).session, Enable(1))
+    assert line.uno.pin(ENABLE).level == 0
+    line.arm.settle(6.0)
+    assert line.uno.pin(ENABLE).level == 1
+    assert look_and_configure(line, PORT, scene, positions).how == "zeroed"
+
+
+def commands_that_clear(plan, line, scene, positions):
+    return (
+        lambda: look_and_configure(line, PORT, scene, positions),
+        lambda: home(line, PORT, scene, positions),
+        lambda: tell(line, PORT, scene, positions, plan.segments.start_usteps, "zeroed"),
+        lambda: jog(line, scene, look(line, PORT, scene, positions), 1, np.radians(-1.0), lambda _told: None),
+    )
+
+
+def test_no_command_clears_the_fault_in_which_drivers_hold_an_upright_arm(plan, positions):
+    line, scene = held_upright(plan, positions)
+    released = len(rises_s(line, ENABLE))
+    line.write(bytes([EMERGENCY_CODE] * 3))
+    line.arm.settle(0.1)
+    for command in commands_that_clear(plan, line, scene, positions):
+        with pytest.raises(
+            LinkError, match=r"fault emergency_stop.*joint 1 falls.*Support the arm, press the board's reset"
+        ):
+            command()
+        assert look(line, PORT, scene, positions).how is None
+    line.arm.settle(0.1)
+    assert line.uno.pin(ENABLE).level == 0
+    assert len(rises_s(line, ENABLE)) == released, "ENABLE never went high"
+
+
+def test_a_fault_whose_drivers_were_released_at_once_is_cleared(plan, positions):
+    line, scene = held_upright(plan, positions, emergency_releases=True)
+    line.write(bytes([EMERGENCY_CODE] * 3))
+    line.arm.settle(0.1)
+    assert line.uno.pin(ENABLE).level == 1
+    tell(line, PORT, scene, positions, plan.segments.start_usteps, "zeroed")
+    assert look(line, PORT, scene, positions).how == "zeroed"
+    assert line.uno.pin(ENABLE).level == 0

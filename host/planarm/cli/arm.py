@@ -22,8 +22,9 @@ if TYPE_CHECKING:
 
 
 NOT_KNOWN = (
-    "the board does not know where its arm stands: it was told nothing since it started, or was stopped in an emergency"
-    " since; the arm is moved without soft limits"
+    "the board does not know where its arm stands: it was told nothing since it started, or has lost it since: it was"
+    " stopped in an emergency, or its drivers were released and the arm falls without; it is moved without soft"
+    " limits"
 )
 
 

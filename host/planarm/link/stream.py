@@ -23,7 +23,15 @@ from planarm.link.plan_steps import LOOK_AHEAD
 from planarm.link.position import MissedStartError
 from planarm.link.progress import progress_of
 from planarm.link.session import Session
-from planarm.link.stream_values import AT_EASE, Joining, Phase, StreamOptions, StreamProgress, soft_limits_at
+from planarm.link.stream_values import (
+    AT_EASE,
+    Joining,
+    Phase,
+    StreamOptions,
+    StreamProgress,
+    clear_drops_words,
+    soft_limits_at,
+)
 from planarm_wire.codec import encoded_bytes
 from planarm_wire.messages import (
     HOLD_CODE,
@@ -215,6 +223,8 @@ class Stream:
             raise LinkError(
                 "the device is executing the motion of an earlier session; wait until it has ended, then try again"
             )
+        if status.state is State.FAULT and status.fault in self._options.kept_faults:
+            raise LinkError(clear_drops_words(status.fault, self._options.falling))
         if status.state is State.FAULT or status.free_bytes < self._board.queue_bytes - QUEUE_FRAME_BYTES:
             self.cleared_fault = status.fault
             self._session.send(Clear(), now_s)

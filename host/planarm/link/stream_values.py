@@ -11,6 +11,7 @@ from planarm_wire.messages import (
     DEFAULT_START_STOP_TICKS,
     DEFAULT_WAKE_TICKS,
     Config,
+    Fault,
     Ledger,
     PinMap,
     SetPosition,
@@ -34,7 +35,8 @@ class StreamOptions:
     told to a device whose drivers are released; one whose drivers are enabled keeps what it was told before.
     `soft_limits` are told in either case, where the device counts `start_usteps`, as the plan begins there: else its
     count is not the arm's place, and it is told that there are none. `released_spread_usteps` is how far each joint can
-    move by itself while the drivers are released; empty: any way. `start_at_s` is a time of the clock at which the
+    move by itself while the drivers are released; empty: any way. `kept_faults` are those in which the drivers hold an
+    arm that CLEAR would drop, and `falling` tells how. `start_at_s` is a time of the clock at which the
     first segment is due: START is given the lead that is left until then, at least `lead_ticks`. `ahead_s` limits how
     much path the device is given beyond what a stop takes, for motions whose rest may be changed on the way; without it
     the device's queue is filled. `wiring` names the pin map of the board that the plan is for.
@@ -47,6 +49,8 @@ class StreamOptions:
     soft_limits: SoftLimits | None = None
     start_usteps: tuple[int, ...] = ()
     released_spread_usteps: tuple[int, ...] = ()
+    kept_faults: tuple[Fault, ...] = ()
+    falling: str = ""
     start_at_s: float | None = None
     ahead_s: float | None = None
     wiring: str = OWN
@@ -137,6 +141,15 @@ def soft_limits_at(ledger: Ledger, options: StreamOptions, warn: Callable[[str],
             " count is not the arm's place; tell it with 'planarm home SCENE' or 'planarm zero SCENE'"
         )
     return SoftLimits((0,) * len(limits.least_usteps), (-1,) * len(limits.most_usteps))
+
+
+def clear_drops_words(fault: Fault, falling: str) -> str:
+    """Say why a fault is not cleared, and the way out."""
+    return (
+        f"the drivers hold the arm in the fault {fault.name.lower()}, which lost its place; clearing it releases them,"
+        f" and {falling}. Support the arm, press the board's reset button (its drivers let go), and tell where it"
+        " stands: 'planarm home SCENE' or 'planarm zero SCENE'"
+    )
 
 
 def position_of(usteps: Sequence[int], joints: int) -> SetPosition:

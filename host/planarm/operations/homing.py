@@ -24,7 +24,7 @@ from planarm.plan_file import arm_hash
 from planarm.scene import JointSpec, LimitSwitchSpec, Scene
 from planarm.stepping.train import least_reversal_ticks
 from planarm.stepping.windows import start_stop_ticks
-from planarm.streaming.configure import configure, falls_anywhere
+from planarm.streaming.configure import configure, falls_anywhere, require_no_drop_by_clear
 from planarm.streaming.standing import known_by
 from planarm_wire.messages import DEBOUNCE_TICKS, Clear, Enable, Fault, Home, Query, State, Stop
 
@@ -124,7 +124,7 @@ def prove_steps(transport: Transport, port: str, scene: Scene, positions: Positi
     session, known_by = _meet(transport, port, scene, positions)
     if known_by != HOMED:
         raise LinkError(
-            f"nothing to compare with: the arm was not homed since the board's last start, its place is"
+            f"nothing to compare with: the arm was not homed since the board's last start, or was let go, its place is"
             f" {known_by or 'not known'}; 'planarm home SCENE' before the run, then ask again after it"
         )
     _warn_of_release(scene, warn)
@@ -134,10 +134,10 @@ def prove_steps(transport: Transport, port: str, scene: Scene, positions: Positi
 
 
 def _warn_of_release(scene: Scene, warn: Warn | None) -> None:
-    """Say so when the arm would fall anywhere between its limits: a switch that is not found releases the drivers."""
+    """Say so when the arm would fall between its limits: a switch that is not found ends in letting it go."""
     falling = falls_anywhere(scene)
     if falling is not None and warn is not None:
-        warn(f"{falling}; homing that finds no switch releases them when that is cleared")
+        warn(f"{falling}; where homing finds no switch, support the arm and reset the board")
 
 
 def _meet(transport: Transport, port: str, scene: Scene, positions: Positions) -> tuple[Session, str | None]:
@@ -162,6 +162,7 @@ def _make_ready(
     """Tell the device of its motors and switches, unless it was told, and switch its drivers on."""
     status = request(transport, session, Query())
     if status.state is not State.IDLE:
+        require_no_drop_by_clear(session, port, scene, positions)
         status = request(transport, session, Clear())
     known = status.ledger.position_usteps[: len(scene.joints)] if known_by is not None else None
     configure(transport, session, port, scene, positions, known)

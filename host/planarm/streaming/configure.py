@@ -17,13 +17,16 @@ from planarm.errors import LinkError
 from planarm.link.exchange import request
 from planarm.link.positions import Positions
 from planarm.link.session import Session
+from planarm.link.stream_values import clear_drops_words
 from planarm.link.transport import Transport
 from planarm.model.transmission import Transmission
 from planarm.scene import Scene
 from planarm.streaming.board_settings import config_of
 from planarm_wire.codec import encode
-from planarm_wire.messages import Clear, Enable, State
+from planarm_wire.messages import Clear, Enable, Fault, State, Status
 
+POSITION_LOST = (Fault.EMERGENCY_STOP, Fault.STOP_INPUT, Fault.HOMING_FAILED)
+"""Faults after which the count is not the arm's place; CLEAR then releases the drivers."""
 POSES_A_JOINT = 7
 """Where an arm may be, when nobody knows where it is: so many angles of each joint, between its limits."""
 
@@ -39,7 +42,7 @@ def configure(
     """Make sure that a board at rest has the scene's CONFIG; one in motion keeps what it has.
 
     Drivers that are on are released for that, unless it is noted that the board has been told the same. Latched faults
-    are cleared where that is needed.
+    are cleared where that is needed; one whose clearing would drop the arm is refused whatever is noted.
 
     Args:
         transport: the line.
@@ -58,6 +61,7 @@ def configure(
     if status.state not in (State.IDLE, State.READY, State.FAULT):
         return
     noted = encode(told)[1].hex()
+    require_no_drop_by_clear(session, port, scene, positions)
     if status.state is not State.IDLE and positions.config(port, welcome.boot_nonce) == noted:
         return
     if status.state is State.FAULT:
@@ -69,6 +73,36 @@ def configure(
         request(transport, session, Enable(0))
     request(transport, session, told)
     positions.note_config(port, welcome.boot_nonce, noted)
+
+
+def faults_kept(scene: Scene) -> tuple[Fault, ...]:
+    """Return the faults in which drivers hold the arm until CLEAR releases them; of a board with the scene's CONFIG."""
+    released = (Fault.EMERGENCY_STOP, Fault.STOP_INPUT) if scene.board_spec.emergency_releases else ()
+    return tuple(fault for fault in POSITION_LOST if fault not in released)
+
+
+def require_no_drop_by_clear(session: Session, port: str, scene: Scene, positions: Positions) -> None:
+    """Check, before CLEAR is sent, that it drops no arm: it releases the drivers after a fault that lost the place.
+
+    Raises:
+        LinkError: the arm would fall; the message says what to do.
+    """
+    status, welcome = session.status, session.welcome
+    assert status is not None and welcome is not None, "the device has told"
+    if status.state is not State.FAULT or status.fault not in POSITION_LOST:
+        return
+    same = positions.config(port, welcome.boot_nonce) == encode(config_of(scene))[1].hex()
+    if same and status.fault not in faults_kept(scene):
+        return
+    falling = falls_anywhere(scene)
+    if falling is not None:
+        raise LinkError(clear_drops_words(status.fault, str(falling)))
+
+
+def stands_no_more(scene: Scene, status: Status) -> bool:
+    """Return whether an arm has left the place that is counted: its drivers are released, and there it falls."""
+    usteps = status.ledger.position_usteps[: len(scene.joints)]
+    return status.state is State.IDLE and falls_on_release(scene, [pose_at(scene, usteps)]) is not None
 
 
 def pose_at(scene: Scene, usteps: Sequence[int]) -> NDArray[np.float64]:

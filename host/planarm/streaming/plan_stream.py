@@ -24,6 +24,7 @@ from planarm.scene import Scene
 from planarm.stepping.certificate import Certificate
 from planarm.stepping.plan import SegmentPlan
 from planarm.streaming.board_settings import config_of, soft_limits_of
+from planarm.streaming.configure import falls_anywhere, faults_kept
 from planarm_wire.messages import SPEC_HASH
 from planarm_wire.steps import signed_steps
 
@@ -37,7 +38,8 @@ FULL_STEPS_RELEASED = 2
 
 def options_for(scene: Scene, plan: SegmentPlan, *, known: bool = True) -> StreamOptions:
     """Return how a plan of a scene is streamed; an arm whose place is not `known` has no soft limits."""
-    flat, resting = not scene.mechanics.gravity, plan.board.joints - len(scene.joints)
+    flat, falling = not scene.mechanics.gravity, falls_anywhere(scene)
+    resting = plan.board.joints - len(scene.joints)
     spread = (*(FULL_STEPS_RELEASED * joint.microsteps for joint in scene.joints), *(0,) * resting)
     return StreamOptions(
         allowances=plan.allowances,
@@ -45,6 +47,8 @@ def options_for(scene: Scene, plan: SegmentPlan, *, known: bool = True) -> Strea
         soft_limits=soft_limits_of(scene) if known else no_soft_limits(plan.board),
         start_usteps=plan.start_usteps if known else (),
         released_spread_usteps=spread if flat else (),
+        kept_faults=() if falling is None else faults_kept(scene),
+        falling="" if falling is None else str(falling),
         wiring=plan.wiring,
     )
 

@@ -22,11 +22,8 @@ from planarm.model.kinematics import forward, inverse_2r
 from planarm.model.transmission import Transmission
 from planarm.plan_file import arm_hash
 from planarm.scene import Scene
-from planarm.streaming.configure import configure
-from planarm_wire.messages import QUEUE_FRAME_BYTES, Clear, Fault, State, Status
-
-POSITION_LOST = (Fault.EMERGENCY_STOP, Fault.STOP_INPUT, Fault.HOMING_FAILED)
-"""Faults after which the count is not the arm's place."""
+from planarm.streaming.configure import POSITION_LOST, configure, require_no_drop_by_clear, stands_no_more
+from planarm_wire.messages import QUEUE_FRAME_BYTES, Clear, Enable, State, Status
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,10 +54,14 @@ def look(transport: Transport, port: str, scene: Scene, positions: Positions) ->
 
 
 def known_by(session: Session, status: Status, port: str, scene: Scene, positions: Positions) -> str | None:
-    """Return by what a board knows where its arm is; None where it was told nothing, or has lost it since."""
+    """Return by what a board knows where its arm is; None where it was told nothing, or has lost it since.
+
+    It has lost it by an emergency, or where its drivers are released at a pose from which the arm falls: `tell` and
+    `home` leave the drivers of such an arm on.
+    """
     assert session.welcome is not None, "an open session has a welcome"
     boot = session.welcome.boot_nonce
-    if status.fault in POSITION_LOST:
+    if status.fault in POSITION_LOST or stands_no_more(scene, status):
         positions.forget(port, boot)
     return positions.how(port, boot, arm_hash(asdict(scene)))
 
@@ -82,16 +83,20 @@ def tell(
 ) -> None:
     """Tell a board at rest where its arm is, and note that it knows.
 
-    What a program that died while it filled the queue has left there is dropped, and a latched fault is cleared.
+    What a program that died while it filled the queue has left there is dropped, and a latched fault is cleared. An arm
+    that would fall from there is held from now on: its place is known only as long as the drivers are on.
 
     Raises:
-        LinkError, DeviceFault: it does not take it.
+        LinkError, DeviceFault: it does not take it, or the arm would be dropped for it.
     """
     session, status = open_on_board(transport, scene.board)
     left_behind = status.state is State.READY and status.free_bytes < scene.board.queue_bytes - QUEUE_FRAME_BYTES
     if left_behind or status.state is State.FAULT:
+        require_no_drop_by_clear(session, port, scene, positions)
         request(transport, session, Clear())
-    request(transport, session, position_of(usteps, session.joints))
+    if stands_no_more(scene, request(transport, session, position_of(usteps, session.joints))):
+        configure(transport, session, port, scene, positions, usteps)
+        request(transport, session, Enable(1))
     assert session.welcome is not None, "an open session has a welcome"
     positions.remember(port, session.welcome.boot_nonce, arm_hash(asdict(scene)), how)
 
@@ -156,7 +161,8 @@ def require_standing(standing: Standing, scene: Scene, wanted: tuple[int, ...]) 
     x_cm, y_cm = pose_of(scene, wanted)[1]
     if standing.how is None:
         raise LinkError(
-            "where the arm stands is not known: the board restarted, or was stopped in an emergency, since it was told."
+            "where the arm stands is not known: since it was told, the board restarted, was stopped in an emergency, or"
+            " released its drivers, without which this arm would fall."
             f" The plan starts at ({x_cm:.2f}, {y_cm:.2f}) cm: 'planarm home SCENE' with limit switches, or put the arm"
             " there and 'planarm zero SCENE'"
         )
