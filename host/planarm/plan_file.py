@@ -22,7 +22,8 @@ from planarm_wire.errors import WireError
 from planarm_wire.messages import SPEC_HASH, Move, Segment
 from planarm_wire.wirings import board_of
 
-FORMAT = 3
+FORMAT = 4
+"""Raised with whatever a plan file must hold: the fields of a scene, too, which stand in it as they are."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,8 +74,13 @@ def load_plan(path: Path) -> StoredPlan:
         ) from error
     except (ValueError, RecursionError) as error:
         raise PlanFileError(f"{path}: is no plan: {error}; make one with 'planarm plan'") from error
-    if not isinstance(body, dict) or body.get("format") != FORMAT:
-        raise PlanFileError(f"{path}: is no plan of format {FORMAT}; make it anew with 'planarm plan'")
+    if not isinstance(body, dict) or "format" not in body:
+        raise PlanFileError(f"{path}: is no plan; make one with 'planarm plan'")
+    if body["format"] != FORMAT:
+        raise PlanFileError(
+            f"{path}: has format {body['format']}, by planarm {body.get('planarm', '?')}, this planarm reads format"
+            f" {FORMAT}; make it anew with 'planarm plan'"
+        )
     if body.pop("sha256", None) != _digest(body):
         raise CertificateError(f"{path}: was changed after it was made (its SHA-256 differs); make it anew")
     if body["spec_hash"] != SPEC_HASH:

@@ -1,18 +1,19 @@
 """Plans are bound to the arm they were made for; the certificate is shown with every plan."""
 
 import json
-from dataclasses import asdict, replace
+from dataclasses import asdict, fields, is_dataclass, replace
 from hashlib import sha256
 from pathlib import Path
+from typing import get_args, get_type_hints
 
 import pytest
 
 from planarm.cli.main import main
 from planarm.errors import CertificateError, PlanFileError
 from planarm.pipeline import plan_scene, stored
-from planarm.plan_file import arm_hash, load_plan, require_arm, save_plan
+from planarm.plan_file import FORMAT, arm_hash, load_plan, require_arm, save_plan
 from planarm.report.tables import certificate_table
-from planarm.scene import parse_scene
+from planarm.scene import Scene, parse_scene
 from planarm.stepping.certificate import Certificate
 from planarm.streaming.plan_stream import stream
 from planarm.warm_up import SMALL_SCENE
@@ -111,3 +112,42 @@ def test_the_command_refuses_before_it_opens_the_port(scene, plan, tmp_path, cap
         main(["stream", str(tmp_path / "small.plan"), "--arm", str(other), "--port", "/no/such/port"])
     assert left.value.code == 4
     assert "another arm" in capsys.readouterr().err
+
+
+def test_a_plan_of_an_older_format_is_refused_in_words_by_whatever_reads_plans(plan, tmp_path, capsys):
+    """Such a scene lacks what scenes have got since; its hash is right, and its wire may be ours."""
+    file = tmp_path / "old.plan"
+    save_plan(stored(plan), file)
+    body = json.loads(file.read_text())
+    body |= {"format": 3, "planarm": "0.0.9"}
+    del body["scene"]["board_spec"], body["sha256"]
+    body["sha256"] = sha256(json.dumps(body, sort_keys=True, separators=(",", ":")).encode()).hexdigest()
+    file.write_text(json.dumps(body))
+    words = r"old\.plan: has format 3, by planarm 0\.0\.9, this planarm reads format 4; make it anew with 'planarm"
+    with pytest.raises(PlanFileError, match=words):
+        load_plan(file)
+    capture = tmp_path / "a.csv"
+    capture.write_text("")
+    for command in (["stream", str(file), "--port", "sim://"], ["timing", str(capture), "--plan", str(file)]):
+        with pytest.raises(SystemExit) as ended:
+            main(command)
+        assert ended.value.code == PlanFileError.exit_code
+        assert "has format 3" in capsys.readouterr().err
+
+
+def test_another_scene_in_plans_is_another_format():
+    """A plan file holds the scene whole: other fields need another `plan_file.FORMAT`, and their hash here."""
+    names = sorted(_field_names(Scene))
+    assert (FORMAT, sha256(" ".join(names).encode()).hexdigest()[:12]) == (4, "0ff2f0eaf655")
+
+
+def _field_names(kind, place="scene"):
+    """Yield every field that `asdict` makes of a dataclass, with its place."""
+    if not is_dataclass(kind):
+        for part in get_args(kind):
+            yield from _field_names(part, place)
+        return
+    hints = get_type_hints(kind)
+    for field in fields(kind):
+        yield f"{place}.{field.name}"
+        yield from _field_names(hints[field.name], f"{place}.{field.name}")
