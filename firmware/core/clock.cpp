@@ -21,6 +21,14 @@ Clock state;
 
 Clock& current() { return hal::by_base(state); }
 
+// A lap is 2^16 ticks: the low half stays.
+void add_laps(uint32_t& ticks, uint16_t laps) {
+    uint16_t halves[2];
+    __builtin_memcpy(halves, &ticks, sizeof(halves));
+    halves[1] = static_cast<uint16_t>(halves[1] + laps);
+    __builtin_memcpy(&ticks, halves, sizeof(halves));
+}
+
 }  // namespace
 
 void reset(uint32_t ticks) {
@@ -62,11 +70,9 @@ int32_t ticks_until(uint32_t ticks) { return static_cast<int32_t>(ticks - curren
 
 void stand_before(uint32_t ticks) {
     Clock& at = current();
-    // Whole laps are 2^16 ticks.
     const uint16_t laps = static_cast<uint16_t>(((at.begun_ticks - ticks) >> 16) + 1);
-    const uint32_t back_ticks = static_cast<uint32_t>(laps) << 16;
-    increase(at.stood_ticks, back_ticks);
-    increase(at.begun_ticks, 0 - back_ticks);
+    add_laps(at.stood_ticks, laps);
+    add_laps(at.begun_ticks, static_cast<uint16_t>(0 - laps));
 }
 
 void end_standing() {

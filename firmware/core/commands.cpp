@@ -80,7 +80,9 @@ Result config(const wire::Config& told) {
     return Result::OK;
 }
 
+// What is queued was checked against the limits of before.
 Result soft_limits(const wire::SoftLimits& told) {
+    if (!queue::is_empty()) return Result::WRONG_STATE;
     const Result result = try_event(Event::SOFT_LIMITS);
     if (result == Result::OK) settings::soft_limits = told;
     return result;

@@ -50,13 +50,13 @@ uint32_t mix(uint32_t count) {
     session::announce();
 }
 
-// The first fault stays, but its drivers, too, are released by an emergency stop.
+// In place of a fault that keeps the position: an emergency loses it, and may release the drivers.
 void serve_emergency() {
     const bool open =
         settings::has_option(settings::STOP_INPUT) && (hal::inputs() & hal::STOP_INPUT_OPEN) != 0;
     const hal::Emergency emergency = hal::emergency();
     if (emergency == hal::Emergency::NONE && !open) return;
-    if (supervisor::state() != wire::State::FAULT) {
+    if (supervisor::clear_event() == supervisor::Event::CLEAR_KEPT) {
         fail(emergency == hal::Emergency::LINE ? wire::Fault::EMERGENCY_STOP : wire::Fault::STOP_INPUT);
     }
     hal::emergency_latched();

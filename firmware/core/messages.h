@@ -130,7 +130,8 @@ enum class MessageType : uint8_t {
     // used.
     CONFIG = 0xA,
     // From the host: Tells where each joint may be, in terms of the ledger's position; segments
-    // that leave it latch soft_limit. Least above most: no limit, as after a reset.
+    // that leave it latch soft_limit. Refused while segments are queued, which were checked against
+    // the limits of before. Least above most: no limit, as after a reset.
     SOFT_LIMITS = 0xB,
     // From the host: Moves one joint to its limit switch and off it again, slowly the second time.
     // Only in state ready, with limit switches watched. The order of the joints is the host's. Ends
@@ -156,8 +157,9 @@ enum class State : uint8_t {
     READY = 1,
     // Executing segments, slowed down while the queue starves; more may be queued.
     RUNNING = 2,
-    // Pulses stopped, first fault latched, drivers keep holding. An emergency stop may release
-    // them. CLEAR leads to ready, or to idle where the position is lost.
+    // Pulses stopped, first fault latched, drivers keep holding. An emergency stop takes the place
+    // of a fault that keeps the position, and may release the drivers. CLEAR leads to ready, or to
+    // idle where the position is lost.
     FAULT = 3,
     // Slowing down along the path towards a hold.
     HOLDING = 4,

@@ -37,7 +37,8 @@ void energise() {
     hal::drivers_enable(true);
     Power& at = hal::by_base(power);
     at.energised = at.waking = true;
-    at.awake_ticks = clock::pass_ticks() + most_of(settings::config.wake_ticks, MARK_TICKS);
+    at.awake_ticks = clock::pass_ticks();
+    increase(at.awake_ticks, most_of(settings::config.wake_ticks, MARK_TICKS));
 }
 
 void release() {

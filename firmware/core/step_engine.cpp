@@ -124,22 +124,30 @@ void finish_pulse() {
     hal::step_fall<JOINT>();
 }
 
-// Cuts the executed part off a joint's active run: that goes to the position, the rest starts at
-// `first_ticks`.
-void cut(uint8_t joint, uint8_t left, uint16_t fraction, uint32_t first_ticks) {
+// Cuts the executed part off the active run of a joint that had its interrupt on, which is off by now: that
+// goes to the position, the rest keeps its distance to the moment, told by both clocks.
+[[gnu::noinline]] void cut_active(uint8_t joint, uint8_t were_on, uint32_t now_ticks, uint16_t counter) {
+    uint8_t mask = 0, left = 0;
+    uint16_t fraction = 0, edge = 0;
+    for_each_joint([&](auto number) {
+        constexpr uint8_t NUMBER = number.NUMBER;
+        if (joint != NUMBER) return;
+        mask = hal::step_interrupt_mask<NUMBER>();
+        left = hal::steps_left<NUMBER>();
+        fraction = hal::step_fraction<NUMBER>();
+        edge = hal::step_edge<NUMBER>();
+    });
+    if ((were_on & mask) == 0) return;
     Run& run = *step_joints[joint].active;
     add_steps(ring_of(joint).position_usteps, run, static_cast<uint8_t>(run.steps - left));
     run.steps = left;
     run.fraction = fraction;
-    run.first_ticks = first_ticks;
+    run.first_ticks = now_ticks + static_cast<uint16_t>(edge - counter);
     if (left == 0) step_joints[joint].active = run.next;
 }
 
-// The same for a joint that had its interrupt on, which is off by now.
-template <uint8_t JOINT>
-void cut_active(uint8_t were_on, uint32_t first_ticks) {
-    if ((were_on & hal::step_interrupt_mask<JOINT>()) == 0) return;
-    cut(JOINT, hal::steps_left<JOINT>(), hal::step_fraction<JOINT>(), first_ticks);
+[[gnu::noinline]] void cut_all(uint8_t were_on, uint32_t now_ticks, uint16_t counter) {
+    for (uint8_t joint = 0; joint < wire::JOINTS; ++joint) cut_active(joint, were_on, now_ticks, counter);
 }
 
 template <uint8_t JOINT>
@@ -245,10 +253,8 @@ uint32_t end_steps() {
         last = hal::end_steps();
     }
     hal::wait_step_high();
-    for_each_joint([&](auto joint) {
-        finish_pulse<joint.NUMBER>();
-        cut_active<joint.NUMBER>(on, 0);
-    });
+    for_each_joint([&](auto joint) { finish_pulse<joint.NUMBER>(); });
+    cut_all(on, 0, 0);
     return clock::extend(last) - hal::LATE_TICKS;
 }
 
@@ -268,17 +274,14 @@ bool freeze(uint32_t& now_ticks) {
     {
         const hal::InterruptLock lock;
         counter = hal::counter();
-        bool may = true;
+        bool may = !missed();
         for_each_joint([&](auto joint) { may = may && may_freeze<joint.NUMBER>(counter); });
         if (!may) return false;
         on = hal::step_interrupts_on();
         hal::steps_off();
     }
     now_ticks = clock::extend(counter);
-    for_each_joint([&](auto joint) {
-        const uint16_t away = static_cast<uint16_t>(hal::step_edge<joint.NUMBER>() - counter);
-        cut_active<joint.NUMBER>(on, now_ticks + away);
-    });
+    cut_all(on, now_ticks, counter);
     for (uint8_t joint = 0; joint < wire::JOINTS; ++joint) take_back(joint);
     return true;
 }

@@ -243,8 +243,9 @@ class MessageType(IntEnum):
     SOFT_LIMITS = 0xB
     """From the host.
 
-    Tells where each joint may be, in terms of the ledger's position; segments that leave it latch soft_limit. Least
-    above most: no limit, as after a reset.
+    Tells where each joint may be, in terms of the ledger's position; segments that leave it latch soft_limit.
+    Refused while segments are queued, which were checked against the limits of before. Least above most: no limit,
+    as after a reset.
     """
     HOME = 0xC
     """From the host.
@@ -278,7 +279,8 @@ class State(IntEnum):
     FAULT = 3
     """Pulses stopped, first fault latched, drivers keep holding.
 
-    An emergency stop may release them. CLEAR leads to ready, or to idle where the position is lost.
+    An emergency stop takes the place of a fault that keeps the position, and may release the drivers. CLEAR leads
+    to ready, or to idle where the position is lost.
     """
     HOLDING = 4
     """Slowing down along the path towards a hold."""
@@ -654,7 +656,8 @@ class Config:
 class SoftLimits:
     """Tells where each joint may be, in terms of the ledger's position; segments that leave it latch soft_limit.
 
-    Least above most: no limit, as after a reset.
+    Refused while segments are queued, which were checked against the limits of before. Least above most: no limit,
+    as after a reset.
 
     From the host, payload 16 bytes.
     """

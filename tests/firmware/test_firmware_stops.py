@@ -213,6 +213,7 @@ def test_segments_outside_the_soft_limits_are_a_fault_that_says_which(firmware: 
     board = configured(firmware)
     board.ask(SoftLimits((-100, -5), (100, 5)))
     assert board.ask(Segments(0, 0, 0, (segment_of(30_000, run_of(9), run_of(5)),))).fault is Fault.NONE
+    assert board.ask(SoftLimits((-9, -9), (9, 9))).refusal is Result.WRONG_STATE, "what is queued kept the others"
     status = board.ask(Segments(0, 0, 0, (segment_of(30_000, run_of(9), run_of(1)),)))
     assert (status.state, status.fault, status.detail) == (State.FAULT, Fault.SOFT_LIMIT, 1)
     assert board.motion_edges() == []
@@ -456,11 +457,43 @@ def test_an_emergency_stop_behind_a_clear_is_kept(
     assert board.ask(Enable(1)).fault is Fault.EMERGENCY_STOP
 
 
-def test_an_emergency_stop_releases_the_drivers_of_another_fault_too(firmware: Firmware) -> None:
+def test_an_emergency_beside_another_fault_is_told_as_what_loses_the_place(
+    emulated_firmware: EmulatedFirmware,
+) -> None:
+    # It has ended the steps, uncounted, before the fault's own end looks at them: that fault keeps the position.
+    board = Board(emulated_firmware)
+    board.get_ready()
+    runs = (run_of(299, first=0, interval=320), run_of(180, first=0, interval=520))
+    for segment in end_motion([segment_of(96_000, *runs)] * 10):
+        board.ask(Segments(0, 0, 0, (segment,)))
+    board.send(Start(LEAD_TICKS))
+    board.run(300_000)
+    uno, seq, edges = emulated_firmware.uno, board.seq, list(board.edges)
+    snapshot = uno.snapshot()
+    refused = Segments(0, 0, 0, (segment_of(0, run_of(1)),))
+    frame_ticks = len(encode_frame(seq, *encode(refused))) * BYTE_TICKS
+    for phase in range(0, 60_000, 5_001):
+        for behind in (0, 2_560):
+            uno.restore(snapshot)
+            board.edges = list(edges)
+            board.forget_replies()
+            board.seq = seq
+            board.run(phase)
+            board.send(refused)
+            if behind:
+                board.run(frame_ticks + behind)
+            board.receive(bytes([EMERGENCY_CODE] * EMERGENCY_REPEATS))
+            board.run(60_000)
+            assert board.ask().fault is Fault.EMERGENCY_STOP
+
+
+def test_an_emergency_stop_takes_the_place_of_a_fault_that_keeps_the_position(firmware: Firmware) -> None:
     board = configured(firmware, options=RELEASES)
     assert board.ask(Segments(0, 0, 0, (segment_of(0, run_of(1)),))).fault is Fault.BAD_SEGMENT
     assert not [edge for edge in board.edges if edge.pin == ENABLE_PIN][-1].level, "on: active low"
     board.receive(bytes([EMERGENCY_CODE] * EMERGENCY_REPEATS))
     board.run(100_000)
-    assert board.ask().fault is Fault.BAD_SEGMENT
-    assert [edge for edge in board.edges if edge.pin == ENABLE_PIN][-1].level
+    assert board.ask().fault is Fault.EMERGENCY_STOP
+    assert [edge for edge in board.edges if edge.pin == ENABLE_PIN][-1].level, "released"
+    status = board.ask(Clear())
+    assert (status.state, status.fault) == (State.IDLE, Fault.NONE), "not ready with drivers that are off"
