@@ -135,6 +135,19 @@ def test_the_first_step_waits_until_the_drivers_are_awake_and_the_host_knows(pla
     assert result.began_s.least - 1e-3 <= first_s - first_tick <= result.began_s.most + 1e-3
 
 
+def test_drivers_that_are_awake_are_not_waited_for_again(plan, positions):
+    scene, start = with_board(plan, wake_s=3.0), plan.segments.start_usteps
+    line = line_to(scene, start)
+    line.clock.wait_until(0.05)
+    tell(line, PORT, scene, positions, start, "zeroed")
+    took_s = []
+    for degrees in (-1.0, 1.0):
+        standing = look_and_configure(line, PORT, scene, positions)
+        took_s.append(jog(line, scene, standing, 1, np.radians(degrees), lambda _told: None)[1].duration_s)
+    assert took_s[0] > 3.0
+    assert took_s[1] < 1.0
+
+
 def test_a_switch_that_the_arm_presses_in_a_run_is_a_fault_that_names_the_joint(plan):
     q_rad = ends_rad(plan)
     switch = LimitSwitchSpec(1, "A1", float(0.5 * q_rad.sum()), bool(q_rad[1] > q_rad[0]), 0.001)

@@ -6,7 +6,8 @@ no message is in flight the device is asked for its status, no sooner than the s
 for the next message.
 
 `hold`, `resume`, `override` and `stop` may be called at any time; each says what the device is to do, and its status
-says when it is done. A hold that nobody here asked for, as a damaged byte may cause, is taken back.
+says when it is done. A hold that nobody here asked for, as a damaged byte may cause, is taken back; one that was asked
+for and is not there is sent again: its byte overtakes frames, so a RESUME that the device has not read yet undoes it.
 """
 
 from bisect import bisect_left
@@ -99,7 +100,9 @@ class Stream:
         self._packer = Packer(session, segments, self._options.allowances)
         self._joining = joining
         self._hold_wanted = False
+        self._hold_seq = 0
         self._stop_wanted = False
+        self._enabled = False
         self._orders: list[HostMessage] = []
 
     @property
@@ -132,7 +135,12 @@ class Stream:
     def hold(self) -> None:
         """Slow down along the path and rest there; in effect within a few milliseconds, whatever is in flight."""
         self._hold_wanted = True
+        self._orders = [order for order in self._orders if not isinstance(order, Resume)]
+        self._send_hold()
+
+    def _send_hold(self) -> None:
         self._session.send_out_of_band(HOLD_CODE)
+        self._hold_seq = self._session.next_seq
 
     def resume(self) -> None:
         """Go on after a hold."""
@@ -256,6 +264,7 @@ class Stream:
             return
         if self._status.state is not State.READY:
             self._session.send(Enable(1), now_s)
+            self._enabled = True
         self.phase = Phase.ENABLING
 
     def _begin_filling(self, now_s: float) -> None:
@@ -263,7 +272,7 @@ class Stream:
             return
         if self._status.state is not State.READY:
             raise LinkError(f"the device took ENABLE but reports {self._status.state.name.lower()}; reset the board")
-        if self._options.config is not None:
+        if self._enabled and self._options.config is not None:
             self._awake_s = now_s + self._options.config.wake_ticks / TICKS_HZ
         self._session.guarded = True
         self.course.before = self._status.ledger
@@ -326,13 +335,21 @@ class Stream:
     # -- sending ------------------------------------------------------------------------------------------------------
 
     def _send_orders(self, now_s: float) -> None:
-        """Send what the owner asked for, and take back a hold that nobody did."""
+        """Send what the owner asked for, a hold that is not there again, and take back one that nobody asked for."""
+        if self._hold_is_missing and self._session.idle and self._session.next_seq != self._hold_seq:
+            self._send_hold()
         held = self._status.state in (State.HOLDING, State.HELD)
         if held and not self._hold_wanted and not self._orders and self._session.idle:
             self.unasked_holds += 1
             self._orders.append(Resume())
         while self._orders and self._session.fits(self._orders[0]):
             self._session.send(self._orders.pop(0), now_s)
+
+    @property
+    def _hold_is_missing(self) -> bool:
+        """Whether the device runs where it is to rest; by a status that may be older than the hold."""
+        running = self._status.state in (State.RUNNING, State.STARVED)
+        return self._hold_wanted and not self._stop_wanted and running
 
     def _send_segments(self, now_s: float) -> None:
         while (message := self._packer.next_message()) is not None:
@@ -360,6 +377,8 @@ class Stream:
 
     def _poll_due_s(self) -> float:
         """When the device can have room for the next message, or can have ended."""
+        if self._hold_is_missing:
+            return self._session.status_s + MIN_POLL_S
         executed = until = self.executed_segments
         if self._packer.next_message() is None:
             until = self.total_segments

@@ -97,6 +97,7 @@ def tell(
     if stands_no_more(scene, request(transport, session, position_of(usteps, session.joints))):
         configure(transport, session, port, scene, positions, usteps)
         request(transport, session, Enable(1))
+        transport.clock.wait_until(transport.clock.now_s() + scene.board_spec.wake_s)
     assert session.welcome is not None, "an open session has a welcome"
     positions.remember(port, session.welcome.boot_nonce, arm_hash(asdict(scene)), how)
 
