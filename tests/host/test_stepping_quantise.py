@@ -178,6 +178,13 @@ def test_the_bound_of_quantisation_covers_poses_off_by_half_a_micro_step():
     assert moved.max() > 0.9 * bound * 0.5 / 0.545
 
 
+def test_arms_that_no_board_steps_have_a_bound_too():
+    arm = Arm((12.0,) * 6, (0.0,) * 6, ((-pi, pi),) * 6)
+    joints = [joint()] * 6
+    levers_cm = 12.0 * sum(range(1, 7))
+    assert quantisation_bound_cm(arm, joints) == pytest.approx(0.605 * levers_cm / joints[0].usteps_per_rad)
+
+
 def test_hysteresis_is_the_way_in_half_the_reversal_time():
     one = joint(acceleration=10.0)
     t_s = 0.5 * MIN_REVERSAL_TICKS / TICKS_HZ

@@ -103,7 +103,7 @@ def check_deviation(trajectory: Trajectory, scene: Scene, made: StepTrain, at: M
         worst = int(np.argmax(deviation[:, number - 1]))
         value, allowed = (
             deviation[worst, number - 1],
-            0.5 + timing_usteps(scene.board) + hysteresis_usteps(axis, scene.board),
+            0.5 + timing_usteps(scene.board.joints) + hysteresis_usteps(axis, scene.board),
         )
         where = f"{ticks[worst] / TICKS_HZ:.6f} s"
         checks.append(at_most(f"joint {number} deviation from the plan", value, allowed, "usteps", where))

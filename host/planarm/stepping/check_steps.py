@@ -36,7 +36,7 @@ def check_counts(train: StepTrain, made: StepTrain, number: int) -> list[Check]:
     around = np.diff(wanted.ticks, prepend=-(1 << 62), append=1 << 62)
     shorter = np.minimum(around[:-1], around[1:])
     shorter = np.where(shorter > 1 << 60, 0, shorter)  # a lone step has no interval
-    allowed = np.maximum(TIMING_TICKS, np.floor(timing_share(train.board) * shorter))
+    allowed = np.maximum(TIMING_TICKS, np.floor(timing_share(train.board.joints) * shorter))
     worst = int(np.argmax(error / allowed))
     where = _time(wanted.ticks[worst])
     return [*checks, at_most(f"{name} timing error", int(error[worst]), int(allowed[worst]), "ticks", where)]
@@ -91,7 +91,7 @@ def _check_acceleration(steps: JointSteps, joint: JointSpec, number: int, board:
     worst = int(np.argmax(acceleration))
     where = _time(steps.ticks[at[worst]])
     # By errors at the worst of all three points.
-    blurred = limit * 4.0 * ERROR_USTEPS * timing_share(board) / STEP_PAIRS
+    blurred = limit * 4.0 * ERROR_USTEPS * timing_share(board.joints) / STEP_PAIRS
     return at_most(name, acceleration[worst], limit, "rad/s^2", where, setting, rounding=blurred, amber=limit)
 
 

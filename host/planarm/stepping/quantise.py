@@ -91,16 +91,16 @@ def quantisation_bound_cm(arm: Arm, joints: Sequence[JointSpec], coupling: Matri
     Half a micro-step and the steps' timing tolerance of each motor, at its lever.
     """
     levers_cm = Transmission.from_joints(joints, coupling).levers_cm(arm.link_lengths_cm)
-    return float((0.5 + timing_usteps(board_of(len(joints)))) * levers_cm.sum())
+    return float((0.5 + timing_usteps(len(joints))) * levers_cm.sum())
 
 
-def timing_usteps(board: Board) -> float:
+def timing_usteps(joints: int) -> float:
     """Return how far a step's timing tolerance can move a joint.
 
     Its share of an interval, where the speed at the step is at most twice the mean (rest at the other end), and the
     rounding to whole ticks.
     """
-    return 2.0 * timing_share(board) + ROUNDING_USTEPS
+    return 2.0 * timing_share(joints) + ROUNDING_USTEPS
 
 
 def hysteresis_usteps(joint: JointSpec, board: Board) -> float:

@@ -67,13 +67,13 @@ def least_reversal_ticks(board: Board) -> int:
     return board.min_interval_ticks + MIN_DIR_SETUP_TICKS
 
 
-def timing_share(board: Board) -> float:
+def timing_share(joints: int) -> float:
     """Return by how much of the shorter interval around it compression may move a step.
 
-    2 % with two joints, whose steps rise on their ticks. 5 % with four, whose queue has less room for more: there an
+    2 % with two joints, whose steps rise on their ticks. 5 % with more, whose queue has less room for more: there an
     interrupt makes up to 12 us of jitter, a fifth of the least interval, anyway (docs/decisions/0127).
     """
-    return 0.02 if board.joints <= 2 else 0.05
+    return 0.02 if joints <= 2 else 0.05
 
 
 def largest_rate_hz(board: Board) -> float:

@@ -23,7 +23,6 @@ from planarm_wire.messages import (
     TICKS_HZ,
 )
 from planarm_wire.steps import LONGEST_INTERVAL_TICKS
-from planarm_wire.wirings import board_of
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,7 +51,7 @@ class Coding:
     @classmethod
     def of(cls, axes: Sequence[JointSpec]) -> Self:
         """Return the coding for motors with these axes' accelerations, on the board of so many."""
-        share = timing_share(board_of(len(axes)))
+        share = timing_share(len(axes))
         return cls(share=share, start_stop_ticks=tuple(start_stop_ticks(axis) for axis in axes))
 
 
