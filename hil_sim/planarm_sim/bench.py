@@ -158,6 +158,9 @@ class Bench:
         self.serial = uno.serial
         self.fault_log: list[str] = []
         self.plant = Plant(rig, uno.cycle, step_cycles=step_cycles, propped=propped)
+        for wiring in drivers:
+            if wiring.enable is not None:  # the resistor that keeps the driver off while nothing drives the pin
+                uno.pin(wiring.enable).drive(0 if wiring.enable_active_high else 1)
         levels = [0] * (1 + max(pin.index for pin in PINS))
         for pin in PINS:
             levels[pin.index] = uno.pin(pin.name).level

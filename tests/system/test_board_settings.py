@@ -200,6 +200,45 @@ def upright(scene, tip_kg=0.1):
     return replace(scene, mechanics=replace(scene.mechanics, gravity=True, end_masses_kg=(0.0, tip_kg)))
 
 
+def upright_run(scene, build):
+    """Stream an upright arm's plan on a board around which `build` makes an arm; return the plan and what it did."""
+    plan = plan_scene(scene, lambda _stage, _share: None)
+    assert plan.certificate.ok, plan.certificate.explain()
+    line, go = run(plan, build(plan.scene))
+    go()
+    line.arm.settle(0.5)
+    return plan, line
+
+
+@pytest.mark.parametrize("active_high", [False, True])
+def test_an_upright_arm_runs_to_its_end_without_a_lost_step(plan, active_high):
+    """Held by hand until its drivers carry it: the resistors on ENABLE keep them off while the board's pins float."""
+    settings = BoardSpec(enable_active_high=active_high)
+    plan, line = upright_run(replace(upright(plan.scene, 0.05), board_spec=settings), lambda scene: scene)
+    found = judge_emulated_arm(plan, judge_pins(plan.segments, line.pins), line.arm)
+    assert found.clean
+    record = line.arm.record()
+    goal_rad = Transmission.of(plan.scene).q_rad(np.array(plan.train.end_usteps))
+    np.testing.assert_allclose(record.q_rad[-1], goal_rad, atol=np.radians(0.5))
+    if not active_high:
+        start_rad = Transmission.of(plan.scene).q_rad(np.array(plan.train.start_usteps))
+        before = record.ticks < falls_s(line, ENABLE)[-1] / TICKS_S
+        np.testing.assert_allclose(record.q_rad[before], np.tile(start_rad, (before.sum(), 1)), atol=1e-12)
+
+
+def test_an_upright_arm_whose_motor_is_too_weak_for_it_loses_steps(plan):
+    """The scene says 1.7 A, the driver is set to a ninth of that: less than gravity needs."""
+
+    def weak(scene):
+        motor = replace(scene.joints[0].motor, current_a=0.19)
+        return replace(scene, joints=(replace(scene.joints[0], motor=motor), scene.joints[1]))
+
+    plan, line = upright_run(upright(plan.scene, 0.05), weak)
+    found = judge_emulated_arm(plan, judge_pins(plan.segments, line.pins), line.arm)
+    assert not found.clean
+    assert {one.motor for one in line.arm.record().lost} == {1}
+
+
 def with_switches_near(scene, usteps):
     """A switch a degree from where the arm stands, for each joint."""
     at_rad = pose_of(scene, usteps)[0] + np.radians([1.0, -1.0])

@@ -29,7 +29,8 @@ class DriverWiring:
         row: the driver.
         step: pin on the board that STEP is wired to; so are the others.
         direction: DIR.
-        enable: ENABLE; None: strapped so that current flows.
+        enable: ENABLE; None: strapped so that current flows. On a bench a resistor keeps the driver off while nothing
+            drives the pin (docs/wiring.md).
         sleep: SLEEP, active low; None: strapped high.
         mode_pins: micro-step pins, as many as the row's modes have; empty: strapped, or switches, to `microsteps`.
         microsteps: resolution when the mode pins are not wired.
