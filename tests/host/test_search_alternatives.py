@@ -119,3 +119,13 @@ def test_the_command_prints_routes_as_a_table_and_as_json(capsys, tmp_path):
         main(["plan", str(scene)])
     assert left.value.code == 2
     assert "--alternatives" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(("name", "links"), [("four_links", 4), ("energy_two_links", 2)])
+def test_scenes_on_a_roadmap_are_refused_in_words(name, links, capsys):
+    with pytest.raises(SystemExit) as left:
+        main(["plan", str(ROOT / "examples" / f"{name}.toml"), "--alternatives", "2"])
+    assert left.value.code == 2
+    told = capsys.readouterr().err
+    assert f"{name}.toml has {links} links and planner.algorithm = 'mpd_star_lite'" in told
+    assert "two-link arms" in told and "leave the option out" in told

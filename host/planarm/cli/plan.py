@@ -26,6 +26,8 @@ def execute(options: argparse.Namespace) -> int:
     if not options.alternatives and not options.output:
         raise UsageError("give -o FILE.plan for a plan, or --alternatives K to see the routes")
     scene = chosen_scene(options)
+    if options.alternatives:
+        _require_alternatives(scene)
     compile_first("planarm")
     if options.alternatives:
         routes = _alternatives(scene, options)
@@ -75,6 +77,20 @@ def execute(options: argparse.Namespace) -> int:
         for run in told.get("rules", ()):
             print(f"by the rule, {run['rule']} D*: {run['what']}")
     return 0
+
+
+def _require_alternatives(scene: Scene) -> None:
+    """Check that a scene's routes can be told apart.
+
+    Raises:
+        UsageError: they cannot.
+    """
+    links = len(scene.arm.link_lengths_cm)
+    if scene.planner.on_roadmap or links != 2:
+        raise UsageError(
+            f"--alternatives tells routes of two-link arms apart that are not planned on a roadmap; {scene.source} has"
+            f" {links} links and planner.algorithm = {scene.planner.algorithm!r}: leave the option out"
+        )
 
 
 def _alternatives(scene: Scene, options: argparse.Namespace) -> list[dict[str, object]]:
