@@ -102,6 +102,8 @@ def test_a_cluster_whose_workers_are_gone_ends_the_campaign_in_time_and_can_be_r
         with pytest.raises(ClusterError, match=r"tcp://.* no worker for 2 s \(limits.cluster_s\).* --resume") as told:
             run_campaign(campaign, engine, tmp_path / "out", False, lose_all)
         assert told.value.told()["code"] == "E208"
+        left = rows_of(tmp_path / "out" / "rows.parquet")
+        assert 10 <= len(left) < 60 and {row["verdict"] for row in left} == {"ok"}, "joined, as after Ctrl-C"
         # Workers are counted once a second; what a closed connection takes to be noticed is Dask's. Alone: 3.0 s.
         assert 2.0 <= time.monotonic() - lost_s[0] < 60.0
         closing = threading.Timer(0.5, cluster.close)
@@ -187,6 +189,30 @@ def test_runs_that_wait_behind_one_that_kills_its_worker_are_not_given_up_with_i
     assert [row["verdict"] for row in rows] == ["failed"] * 3 + ["ok"] * 3 + ["failed"] * 3
     assert all("its worker died each time" in row["reason"] for row in rows[:3])
     assert all("asked to raise" in row["reason"] for row in rows[6:])
+
+
+class Busy(Suspecting):
+    """A cluster whose scheduler takes some seconds for each answer, as one with many tasks does."""
+
+    answers_in_s = 4.0
+
+    def nthreads(self, callback_timeout):
+        if callback_timeout < self.answers_in_s:
+            raise TimeoutError
+        return super().nthreads(callback_timeout)
+
+
+@pytest.mark.parametrize("answers_in_s", [4.0, 6.0])
+def test_a_busy_scheduler_has_some_seconds_for_its_answer_whatever_the_patience(tmp_path, monkeypatch, answers_in_s):
+    monkeypatch.setitem(sys.modules, "distributed", SimpleNamespace(Client=Busy, KilledWorker=KilledWorker))
+    monkeypatch.setattr(Busy, "answers_in_s", answers_in_s)
+    campaign = campaign_of(tmp_path, '["answer"]', 6, 2)
+    with DaskEngine("tcp://nowhere", 0.01) as engine:
+        if answers_in_s < 5.0:
+            assert run_campaign(campaign, engine, tmp_path / "dask", False, nothing).whole
+        else:
+            with pytest.raises(ClusterError, match=r"not answered for 5 s \(limits.cluster_s, at least 5\)"):
+                run_campaign(campaign, engine, tmp_path / "dask", False, nothing)
 
 
 def test_a_scheduler_that_is_not_there_is_told():

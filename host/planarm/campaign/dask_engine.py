@@ -18,6 +18,8 @@ from planarm.errors import ClusterError, UsageError
 
 LOOK_S = 1.0
 """Where nothing finishes, the workers are counted so often."""
+ANSWER_S = 5.0
+"""The scheduler has at least so long for its answer: a busy one takes seconds, with workers that are well."""
 
 
 class DaskEngine:
@@ -25,7 +27,7 @@ class DaskEngine:
 
     Args:
         address: the scheduler's, like tcp://HOST:8786.
-        patience_s: how long there may be no worker, or no answer from the scheduler.
+        patience_s: how long there may be no worker, or no answer from the scheduler (at least ANSWER_S).
 
     Raises:
         UsageError: dask.distributed is not installed, or no scheduler answers there.
@@ -134,10 +136,11 @@ class DaskEngine:
             raise self._lost(f"it has had no worker for {self._patience_s:g} s (limits.cluster_s)")
 
     def _count_workers(self) -> int:
+        answer_s = max(self._patience_s, ANSWER_S)
         try:
-            return len(self._client.nthreads(callback_timeout=self._patience_s))
+            return len(self._client.nthreads(callback_timeout=answer_s))
         except TimeoutError as error:
-            reason = f"its scheduler has not answered for {self._patience_s:g} s (limits.cluster_s)"
+            reason = f"its scheduler has not answered for {answer_s:g} s (limits.cluster_s, at least {ANSWER_S:g})"
             raise self._lost(reason) from error
         except OSError as error:
             raise self._lost(f"its scheduler is gone ({error})") from error

@@ -12,6 +12,7 @@ from pathlib import Path
 from planarm.campaign.engine import Engine
 from planarm.campaign.spec import Campaign
 from planarm.campaign.store import ResultStore, about
+from planarm.errors import ClusterError
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,7 +47,7 @@ def run_campaign(
         UsageError: the folder holds other results.
         OutputError: it cannot be written.
         SceneError: the scenes or settings are wrong for every run; single wrong ones are failed rows.
-        ClusterError: the cluster is gone; everything finished is kept, and `resume` goes on from there.
+        ClusterError: the cluster is gone; everything finished is kept, joined, and `resume` goes on from there.
     """
     store = ResultStore(folder, about(campaign), resume)
     done = store.done()
@@ -65,6 +66,10 @@ def run_campaign(
             if not (verdicts or done):  # there is nothing to keep or to tell of
                 raise
             stopped = True
+        except ClusterError:
+            if verdicts or done:
+                store.join()
+            raise
     table = store.join()
     return Outcome(dict(verdicts), len(done), table, not stopped, time.monotonic() - began_s)
 
