@@ -22,7 +22,7 @@ def execute(options: argparse.Namespace) -> int:
         homed = act(arm.transport, arm.port, arm.scene, arm.positions, notice.warn)
     if options.prove and not options.json:
         _tell(homed)
-    stands = homed.kept_usteps if options.prove else homed.usteps
+    stands = homed.inside_usteps or (homed.kept_usteps if options.prove else homed.usteps)
     told = {} if options.prove and not options.json else _figures(homed)  # else told already, in sentences
     tell_standing(options.json, arm.scene, stands, "homed", **told)
     return StepsDifferError.exit_code if options.prove and any(homed.lost_usteps or ()) else 0

@@ -14,7 +14,6 @@ from planarm.link.stream import StreamProgress
 from planarm.link.transport import Transport
 from planarm.model.arm import Arm
 from planarm.model.kinematics import forward
-from planarm.model.transmission import Transmission
 from planarm.motions.margin import planning_margin_cm
 from planarm.motions.motion import timed
 from planarm.notice import silent
@@ -99,20 +98,34 @@ def jog(
 ) -> tuple[SegmentPlan, StreamResult]:
     """Turn one joint, from 0, by an angle, straight; among the obstacles where the arm's place is known.
 
-    `warn` is told as in `goto`, where the place is known.
+    `warn` is told as in `goto`, where the place is known. A joint that stands outside its limits may turn as far as it
+    is out, and inwards.
 
     Raises:
         NoPathError: it would touch one.
         PlanarmError: as in timing and streaming.
     """
+    end_rad = pose_of(scene, standing.usteps)[0]
+    end_rad[joint] += by_rad
+    return move_straight(transport, scene, standing, end_rad, on_progress, warn)
+
+
+def move_straight(
+    transport: Transport,
+    scene: Scene,
+    standing: Standing,
+    end_rad: NDArray[np.float64],
+    on_progress: Progress,
+    warn: Warn | None = None,
+) -> tuple[SegmentPlan, StreamResult]:
+    """Turn the joints straight to angles, shape (joints,); all else as `jog`."""
     known = standing.how is not None
+    begin = pose_of(scene, standing.usteps)[0]
+    scene = _with_limits_around(scene, begin)
     anywhere = replace(scene.arm, floor=False, joint_limits_rad=tuple((-1e3, 1e3) for _ in scene.joints))
     free = scene if known else replace(scene, obstacles=(), arm=anywhere)
-    begin = Transmission.of(scene).q_rad(np.array(standing.usteps))
-    end = begin.copy()
-    end[joint] += by_rad
     world = joint_world(free, planning_margin_cm(free))
-    spline = blend_poses(np.array([begin, end]), Arm.from_spec(scene.arm), world, None)
+    spline = blend_poses(np.array([begin, end_rad]), Arm.from_spec(scene.arm), world, None)
     speed_limits = Limits.of(scene)
     fastest = fastest_motion(spline, speed_limits)
     trajectory, train, segments = schedule(scene, lambda limit: timed(scene, fastest, speed_limits, limit))
@@ -124,3 +137,10 @@ def jog(
         warn_before(scene, segments, warn)
     options = options_for(scene, segments, known=known)
     return segments, stream(segments, certificate, transport, on_progress, options, warn=warn)
+
+
+def _with_limits_around(scene: Scene, q_rad: NDArray[np.float64]) -> Scene:
+    """Return the scene with joint limits that a pose is within; homing ends outside, where switches lie beyond them."""
+    limits = zip(scene.arm.joint_limits_rad, map(float, q_rad), strict=True)
+    hull = tuple((min(low, angle), max(high, angle)) for (low, high), angle in limits)
+    return replace(scene, arm=replace(scene.arm, joint_limits_rad=hull))

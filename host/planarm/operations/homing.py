@@ -4,28 +4,32 @@ The device counts on while a joint is moved to its switch. What it counted where
 switch is, are the steps that the motor was told and did not make. A rotor falls back into step only by whole turns of
 its field, four full steps each; so a difference tells their number without doubt as long as the switch repeats within
 two full steps, and what is left over is the switch's own play.
+
+Switches lie beyond the joints' limits, as no lawful motion presses one; so at the end the arm moves to within them.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 
 import numpy as np
 
-from planarm.errors import DeviceFault, LinkError, SceneError
+from planarm.errors import DeviceFault, LinkError, NoPathError, SceneError
 from planarm.link.exchange import open_on_board, request
+from planarm.link.position import moved_usteps
 from planarm.link.positions import Positions
 from planarm.link.session import Session, fault_words
 from planarm.link.stream_values import position_of
 from planarm.link.transport import Transport
 from planarm.model.transmission import Transmission
+from planarm.operations.arm_moves import move_straight
 from planarm.plan_file import arm_hash
 from planarm.scene import JointSpec, LimitSwitchSpec, Scene
 from planarm.stepping.train import least_reversal_ticks
 from planarm.stepping.windows import start_stop_ticks
 from planarm.streaming.configure import configure, falls_anywhere, require_no_drop_by_clear
-from planarm.streaming.standing import known_by
+from planarm.streaming.standing import Standing, known_by, pose_of
 from planarm_wire.messages import DEBOUNCE_TICKS, Clear, Enable, Fault, Home, Query, State, Stop
 
 Warn = Callable[[str], None]
@@ -35,6 +39,8 @@ FIELD_FULL_STEPS = 4
 HOMING_SLOWER = 4
 SETTLED_TICKS = 3 * DEBOUNCE_TICKS
 """Least interval of the steps onto the switch: it is believed before the next step, also after bouncing."""
+INSIDE_RAD = np.radians(1.0)
+"""So far within its limits a joint is brought from a switch beyond them."""
 BACK_RAD = np.radians(15.0)
 HOMING_POLL_S = 0.05
 HOMING_LIMIT_S = 120.0
@@ -75,19 +81,26 @@ class Touched:
 
 @dataclass(frozen=True, slots=True)
 class Homed:
-    """Every joint's touch, in the order of the joints, and by what the count was known before (None: it was not)."""
+    """Every joint's touch, in the order of the joints.
+
+    Attributes:
+        touched: the touches.
+        known_by: by what the count was known before; None: it was not.
+        inside_usteps: where the motors stand after the move to within the joints' limits; (): there was none.
+    """
 
     touched: tuple[Touched, ...]
     known_by: str | None
+    inside_usteps: tuple[int, ...] = ()
 
     @property
     def usteps(self) -> tuple[int, ...]:
-        """Where the motors stand: at their switches."""
+        """Where the motors stood at their switches."""
         return tuple(touch.switch_usteps for touch in self.touched)
 
     @property
     def kept_usteps(self) -> tuple[int, ...]:
-        """Where the motors stand by the old count less what was lost: free of the switches' play."""
+        """Where the motors stood there by the old count less what was lost: free of the switches' play."""
         return tuple(touch.counted_usteps - touch.lost_usteps for touch in self.touched)
 
     @property
@@ -99,8 +112,9 @@ class Homed:
 def home(transport: Transport, port: str, scene: Scene, positions: Positions, warn: Warn | None = None) -> Homed:
     """Move every joint to its limit switch, in the scene's order of switches, and take the position from there.
 
-    `warn` is told when the arm would fall once its drivers let go of it. Drivers that hold it are released only where
-    the board has other settings than the scene's, and the arm does not fall.
+    Where switches lie beyond the joints' limits the arm then moves straight to within them, if that is proved free.
+    `warn` is told when it is not, and when the arm would fall once its drivers let go of it. Drivers that hold it are
+    released only where the board has other settings than the scene's, and the arm does not fall.
 
     Raises:
         SceneError: a joint has no switch, or motors move several joints.
@@ -111,7 +125,7 @@ def home(transport: Transport, port: str, scene: Scene, positions: Positions, wa
     _warn_of_release(scene, warn)
     _make_ready(transport, session, port, scene, positions, known_by)
     homed = Homed(_touch_all(transport, session, scene), known_by)
-    return _settle(transport, port, scene, positions, session, homed, homed.usteps)
+    return _settle(transport, port, scene, positions, session, homed, homed.usteps, warn)
 
 
 def prove_steps(transport: Transport, port: str, scene: Scene, positions: Positions, warn: Warn | None = None) -> Homed:
@@ -130,7 +144,7 @@ def prove_steps(transport: Transport, port: str, scene: Scene, positions: Positi
     _warn_of_release(scene, warn)
     _make_ready(transport, session, port, scene, positions, known_by)
     homed = Homed(_touch_all(transport, session, scene), known_by)
-    return _settle(transport, port, scene, positions, session, homed, homed.kept_usteps)
+    return _settle(transport, port, scene, positions, session, homed, homed.kept_usteps, warn)
 
 
 def _warn_of_release(scene: Scene, warn: Warn | None) -> None:
@@ -190,12 +204,35 @@ def _settle(
     session: Session,
     homed: Homed,
     usteps: tuple[int, ...],
+    warn: Warn | None,
 ) -> Homed:
-    """Tell the device where its arm stands, and note that it knows."""
+    """Tell the device where its arm stands, note that it knows, and bring the arm to within its limits."""
     request(transport, session, position_of(usteps, session.joints))
     assert session.welcome is not None, "an open session has a welcome"
     positions.remember(port, session.welcome.boot_nonce, arm_hash(asdict(scene)), HOMED)
-    return homed
+    return replace(homed, inside_usteps=_move_inside(transport, scene, Standing(session, usteps, HOMED), warn))
+
+
+def _move_inside(transport: Transport, scene: Scene, standing: Standing, warn: Warn | None) -> tuple[int, ...]:
+    """Move joints from outside their limits to within them; return where the motors stand, () without a move."""
+    at_rad = pose_of(scene, standing.usteps)[0]
+    low, high = np.array(scene.arm.joint_limits_rad).T
+    inside_rad = np.minimum(INSIDE_RAD, 0.5 * (high - low))
+    end_rad = np.where((low < at_rad) & (at_rad < high), at_rad, np.clip(at_rad, low + inside_rad, high - inside_rad))
+    if np.array_equal(end_rad, at_rad):
+        return ()
+    try:
+        _, done = move_straight(transport, scene, standing, end_rad, lambda _told: None)
+    except NoPathError as error:
+        if warn is None:
+            raise
+        warn(
+            "the arm was homed, but stands outside arm.joint_limits_deg at its switches, and the straight way inside"
+            f" is not free ({error}); jog its joints inside, or change limit_switches.at_deg"
+        )
+        return ()
+    moved = moved_usteps(done.ledger_before, done.ledger_after)
+    return tuple(at + by for at, by in zip(standing.usteps, moved, strict=False))
 
 
 def _place_usteps(scene: Scene, switch: LimitSwitchSpec) -> int:
