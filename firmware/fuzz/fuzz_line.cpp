@@ -79,6 +79,7 @@ struct Joint {
     bool dir_high = false;
     uint64_t turned = LONG_AGO;
     int32_t steps = 0;  // with DIR high less those with DIR low, since the last look
+    int32_t later = 0;  // the same, behind the moment that the position is told for
     int32_t told = 0;   // the ledger at that look
 };
 
@@ -105,16 +106,20 @@ class Witness {
         }
     }
 
+    // The position first: to ask for it takes time, in which a step may rise.
     void look() {
+        const uint64_t begun = planarm_now();
+        const planarm::step_engine::Position position = planarm::step_engine::position();
+        const uint16_t later = static_cast<uint16_t>(position.counter - static_cast<uint16_t>(begun));
         planarm_edge edge;
-        while (planarm_take_edges(&edge, 1) != 0) see(edge);
+        while (planarm_take_edges(&edge, 1) != 0) see(edge, edge.tick > begun + later);
         uint8_t byte;
         while (planarm_take_sent(&byte, 1) != 0) hear(byte);
-        compare_ledger();
+        compare_ledger(position);
     }
 
   private:
-    void see(const planarm_edge& edge) {
+    void see(const planarm_edge& edge, bool is_later) {
         for (uint8_t joint = 0; joint < wire::JOINTS; ++joint) {
             Joint& seen = joints_[joint];
             if (edge.pin == wire::DIR_PINS[joint]) {
@@ -133,13 +138,12 @@ class Witness {
                     "two steps nearer than the least interval");
             require(is_apart(seen.turned, edge.tick, wire::MIN_DIR_SETUP_TICKS), "DIR too late for STEP");
             seen.rose = edge.tick;
-            seen.steps += seen.dir_high ? 1 : -1;
+            (is_later ? seen.later : seen.steps) += seen.dir_high ? 1 : -1;
         }
     }
 
     // Every step is counted, but for an emergency stop, which loses the position, and SET_POSITION.
-    void compare_ledger() {
-        const planarm::step_engine::Position position = planarm::step_engine::position();
+    void compare_ledger(const planarm::step_engine::Position& position) {
         const wire::Fault fault = planarm::supervisor::fault();
         const bool lost = fault == wire::Fault::EMERGENCY_STOP || fault == wire::Fault::STOP_INPUT;
         for (uint8_t joint = 0; joint < wire::JOINTS; ++joint) {
@@ -149,7 +153,8 @@ class Witness {
             require(lost || told_ || position.usteps[joint] - seen.told == made,
                     "the ledger is not what the pins have made");
             seen.told = position.usteps[joint];
-            seen.steps = 0;
+            seen.steps = seen.later;
+            seen.later = 0;
         }
         told_ = false;
     }

@@ -56,8 +56,9 @@ RELEASE = Path(__file__).parents[2] / "firmware" / "release"
 OTHERS = ["uno_four", "uno_slow", "cnc_shield", "cnc_shield_four"]
 FIFTEEN_K = TICKS_HZ // 15_000
 # Largest distance of a rise from its tick: 0 on a compare output, 12 us of joints 3 and 4; on the shield what may run
-# when a step of joint 1 or 2 is due. With four joints that is a receive interrupt (39), a lock (27), both joints 3 and 4
-# (288) and once more a look at them (76), the other joint (90) and the instructions between and before the rise (17): 537.
+# when a step of joint 1 or 2 is due. With four joints that is a receive interrupt (39), a lock (27), both joints 3 and
+# 4 (288) and once more a look at them (76), the other joint (90) and the instructions between and before the rise (17):
+# 537.
 MOST_OFF_TICKS = {
     "uno_four": (0, 0, 192, 192),
     "uno_slow": (0, 0),
