@@ -14,12 +14,13 @@ from planarm.link.positions import Positions
 from planarm.link.stream_values import position_of
 from planarm.link.transport import open_transport
 from planarm.model.transmission import Transmission
-from planarm.operations.arm_moves import jog
+from planarm.operations.arm_moves import goto, jog
 from planarm.operations.homing import home
 from planarm.pipeline import plan_scene
 from planarm.record.look import judge_emulated_arm, judge_pins
 from planarm.scene import BoardSpec, LimitSwitchSpec, load_scene
 from planarm.streaming.plan_stream import options_for, stream
+from planarm.streaming.pressed import switch_doubts
 from planarm.streaming.standing import look, look_and_configure, pose_of, require_standing, tell, usteps_at
 from planarm_wire.messages import EMERGENCY_CODE, Clear, Enable, Fault, Query, State
 
@@ -367,3 +368,42 @@ def test_a_fault_whose_drivers_were_released_at_once_is_cleared(plan, positions)
     tell(line, PORT, scene, positions, plan.segments.start_usteps, "zeroed")
     assert look(line, PORT, scene, positions).how == "zeroed"
     assert line.uno.pin(ENABLE).level == 0
+
+
+@pytest.mark.parametrize("closed", [True, False])
+def test_a_switch_that_contradicts_the_known_place_is_told_before_a_motion(plan, positions, tmp_path, closed):
+    """A broken wire reads as pressed where the switches are normally closed; else it takes a short."""
+    start = plan.segments.start_usteps
+    far_rad = pose_of(plan.scene, start)[0] + np.radians([10.0, -10.0])
+    switches = tuple(LimitSwitchSpec(j + 1, f"A{j + 1}", float(far_rad[j]), j == 0, 0.001, closed) for j in range(2))
+    scene = replace(plan.scene, limit_switches=switches)
+    for state in ("stuck_open", "stuck_closed"):
+        faults = tmp_path / "wire.toml"
+        told = f'[[faults]]\nkind = "mechanics.limit_switch"\nswitch = 2\nstate = "{state}"\n'
+        faults.write_text(f'zero = "power_up"\n{told}')
+        line = line_to(scene, start, faults)
+        line.clock.wait_until(0.05)
+        tell(line, PORT, scene, positions, start, "zeroed")
+        standing, said = look_and_configure(line, PORT, scene, positions), []
+        broken = (state == "stuck_open") == closed
+        assert bool(standing.doubts) == broken
+        if broken:
+            refusal = r"joint 2: its limit switch on A2 reads pressed at -.* degrees.*broken wire.*normally_closed"
+            with pytest.raises(LinkError, match=refusal):
+                require_standing(standing, scene, start)
+            with pytest.raises(LinkError, match=refusal):
+                goto(line, scene, standing, scene.task.goal_cm, lambda _told: None)
+        else:
+            require_standing(standing, scene, start)
+        jog(line, scene, standing, 1, np.radians(-1.0), lambda _told: None, said.append)
+        assert said == ([standing.doubts] if broken else [])
+
+
+def test_a_switch_that_should_be_pressed_and_is_not_is_told_and_one_nearby_may_be_either(plan):
+    start = plan.segments.start_usteps
+    at_rad = pose_of(plan.scene, start)[0]
+    for beyond_deg, doubted in ((5.0, True), (1.0, False), (-1.0, False)):
+        switch = LimitSwitchSpec(2, "A2", float(at_rad[1] + np.radians(beyond_deg)), False, 0.001)
+        scene = replace(plan.scene, limit_switches=(switch,))
+        assert not switch_doubts(scene, start, 0b10)
+        assert ("reads released" in switch_doubts(scene, start, 0b00)) == doubted

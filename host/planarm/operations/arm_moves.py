@@ -24,7 +24,7 @@ from planarm.stepping.certify import certify
 from planarm.stepping.plan import SegmentPlan
 from planarm.stepping.schedule import schedule
 from planarm.streaming.plan_stream import options_for, stream, warn_before
-from planarm.streaming.standing import Standing, pose_of
+from planarm.streaming.standing import Standing, pose_of, require_no_doubts
 from planarm.trajectory.limits import Limits
 from planarm.trajectory.timing import fastest_motion
 from planarm.workspace.joint_proof import joint_world
@@ -47,12 +47,13 @@ def goto(
     `warn` is told before it moves what may go wrong: an arm that would fall on release, a limit switch on its way.
 
     Raises:
-        LinkError: the arm's place is not known.
+        LinkError: the arm's place is not known, or its limit switches contradict it.
         UsageError: the scene's planner does not go from or to what is given.
         PlanarmError: as in planning and streaming.
     """
     if standing.how is None:
         raise LinkError("where the arm stands is not known: 'planarm home SCENE' or 'planarm zero SCENE' first")
+    require_no_doubts(standing)
     there = replace(scene, task=_task(scene, standing, target_cm, pose_rad))
     plan = plan_scene(there, silent)
     if plan.segments.start_usteps != standing.usteps:
@@ -133,6 +134,8 @@ def move_straight(
     start_cm = pose_of(scene, standing.usteps)[1]
     here = replace(free, task=replace(scene.task, start_cm=start_cm, goal_cm=goal_cm))
     certificate = certify(here, trajectory, train, segments)
+    if standing.doubts and warn is not None:
+        warn(standing.doubts)
     if known and warn is not None:
         warn_before(scene, segments, warn)
     options = options_for(scene, segments, known=known)

@@ -16,7 +16,7 @@ PINS = tuple(f"D{n}" for n in range(2, 14)) + tuple(f"A{n}" for n in range(6))
 class LimitSwitchSpec:
     """A switch: `joint` counts from 1, `above` tells whether it is pressed at and beyond `at_rad` or up to it.
 
-    One that is `normally_closed` opens when it is pressed, so that a broken wire is noticed, too.
+    One that is `normally_closed` opens when it is pressed, so that a broken wire reads as pressed.
     """
 
     joint: int

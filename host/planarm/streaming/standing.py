@@ -6,7 +6,7 @@ boots do. An emulated arm stands where its plan begins, because it was put there
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,7 +23,11 @@ from planarm.model.transmission import Transmission
 from planarm.plan_file import arm_hash
 from planarm.scene import Scene
 from planarm.streaming.configure import POSITION_LOST, configure, require_no_drop_by_clear, stands_no_more
-from planarm_wire.messages import QUEUE_FRAME_BYTES, Clear, Enable, State, Status
+from planarm.streaming.pressed import switch_doubts
+from planarm_wire.messages import DEBOUNCE_TICKS, QUEUE_FRAME_BYTES, TICKS_HZ, Clear, Enable, Query, State, Status
+
+SWITCHES_READ_S = 3 * DEBOUNCE_TICKS / TICKS_HZ
+"""From CONFIG, which may turn their sense, until the board's word of its switches counts."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,11 +38,13 @@ class Standing:
         session: the open session.
         usteps: of each motor, by the ledger.
         how: by what it knows that; None: it was told nothing since it started, or has lost it.
+        doubts: what its limit switches read that contradicts it, in words; "": nothing, or nobody looked.
     """
 
     session: Session
     usteps: tuple[int, ...]
     how: str | None
+    doubts: str = ""
 
 
 def look(transport: Transport, port: str, scene: Scene, positions: Positions) -> Standing:
@@ -67,7 +73,7 @@ def known_by(session: Session, status: Status, port: str, scene: Scene, position
 
 
 def look_and_configure(transport: Transport, port: str, scene: Scene, positions: Positions) -> Standing:
-    """Ask a board where its arm is, and make sure that it has the scene's CONFIG before it moves.
+    """Ask a board where its arm is, and make sure that it has the scene's CONFIG before it moves; look at its switches.
 
     Raises:
         LinkError, DeviceFault: as `look` and `configure`.
@@ -75,7 +81,11 @@ def look_and_configure(transport: Transport, port: str, scene: Scene, positions:
     standing = look(transport, port, scene, positions)
     known = standing.usteps if standing.how is not None else None
     configure(transport, standing.session, port, scene, positions, known)
-    return standing
+    if known is None or not scene.limit_switches:
+        return standing
+    transport.clock.wait_until(transport.clock.now_s() + SWITCHES_READ_S)
+    inputs = request(transport, standing.session, Query()).inputs
+    return replace(standing, doubts=switch_doubts(scene, known, inputs))
 
 
 def tell(
@@ -146,15 +156,25 @@ def prepare(transport: Transport, port: str, scene: Scene, positions: Positions,
         LinkError, DeviceFault: as `look_and_configure`.
     """
     if transport.pins is None:
-        look_and_configure(transport, port, scene, positions)
+        require_no_doubts(look_and_configure(transport, port, scene, positions))
         return
     session = open_session(transport)
     session.require_board(scene.board)
     request(transport, session, position_of(start_usteps, session.joints))
 
 
+def require_no_doubts(standing: Standing) -> None:
+    """Check that the limit switches read what they should.
+
+    Raises:
+        LinkError: they do not; the message says what to do.
+    """
+    if standing.doubts:
+        raise LinkError(standing.doubts)
+
+
 def require_standing(standing: Standing, scene: Scene, wanted: tuple[int, ...]) -> None:
-    """Check that the arm is known to stand where a plan begins.
+    """Check that the arm is known to stand where a plan begins, and that its switches do not contradict.
 
     Raises:
         LinkError: it is not; the message says what to do.
@@ -167,6 +187,7 @@ def require_standing(standing: Standing, scene: Scene, wanted: tuple[int, ...]) 
             f" The plan starts at ({x_cm:.2f}, {y_cm:.2f}) cm: 'planarm home SCENE' with limit switches, or put the arm"
             " there and 'planarm zero SCENE'"
         )
+    require_no_doubts(standing)
     if standing.usteps != wanted:
         at_cm = pose_of(scene, standing.usteps)[1]
         raise LinkError(
