@@ -130,7 +130,7 @@ def cheapest(
     cost = charge(windows, following, last, begin, end, best)
     trial = np.zeros_like(best)
     for shorter in range(size - 1, max(size - 1 - SHORTER_SIZES, 0), -1):
-        count_steps(windows, following, shorter, trial)
+        count_steps(windows, following, last, shorter, trial)
         trial_end = try_segment(windows, following, last, begin, fast_ticks, duration_ticks, trial)
         if trial_end > begin and end < duration_ticks:
             trial_cost = charge(windows, following, last, begin, trial_end, trial)
@@ -187,7 +187,7 @@ def try_size(
     as many steps more as there are joints are tried, fewer than `fails`.
     """
     for longer in range(size, min(size + trial.shape[0] + 1, fails)):
-        count_steps(windows, following, longer, trial)
+        count_steps(windows, following, last, longer, trial)
         end = try_segment(windows, following, last, begin, fast_ticks, duration_ticks, trial)
         if end != NO_BORDER:
             return (end, longer) if end > begin else (-1, size)
@@ -195,16 +195,25 @@ def try_size(
 
 
 @kernel
-def count_steps(windows: Windows, following: Ticks, size: int, trial: Ticks) -> None:
-    """Fill in how many of the next `size` steps, in the order of time, are each joint's; as many must be left."""
+def count_steps(windows: Windows, following: Ticks, last: Ticks, size: int, trial: Ticks) -> None:
+    """Fill in how many of the next `size` steps, in the order of time, are each joint's; as many must be left.
+
+    A joint whose last step was late makes its next one no sooner than it can: of a slow joint that is long after its
+    tick, when the others have made many steps.
+    """
     for j in range(trial.shape[0]):
         trial[j, COUNT] = 0
     for _ in range(size):
         soonest, tick = 0, -NEVER
         for j in range(trial.shape[0]):
             n = following[j] + trial[j, COUNT]
-            if n < windows.first[j + 1] and windows.steps[n, TICK] < tick:
-                soonest, tick = j, windows.steps[n, TICK]
+            if n >= windows.first[j + 1]:
+                continue
+            due = windows.steps[n, TICK]
+            if trial[j, COUNT] == 0:
+                due = max(due, last[j] + windows.steps[n, GAP])
+            if due < tick:
+                soonest, tick = j, due
         trial[soonest, COUNT] += 1
 
 
