@@ -116,7 +116,7 @@ def test_a_cut_line_bounds_the_position():
         stream_plan(line, plan)
     fewest, most = caught.value.position.executed_segments
     assert fewest <= len(line.device.segments_executed) <= most
-    assert most - fewest <= 45
+    assert most - fewest <= 50  # what the queue holds: 848 bytes, of which each takes 17 or more
 
 
 def test_a_line_that_comes_back_after_an_underrun_gives_the_exact_position():
