@@ -37,7 +37,8 @@ def assert_kept_its_pace(segments, run):
     """It ran at the rate that was announced, all along, and took as long; every step came."""
     result, running, said, rises = run
     percent = result.path_clock_percent
-    assert len(said) == (percent < 100)
+    paces = [words for words in said if not words.startswith("soft limits")]  # no place was told to this board
+    assert len(paces) == (percent < 100)
     assert {one.state for one in running} == {State.RUNNING}, "it never starved"
     assert min(one.rate_percent for one in running) == percent, "and was never slowed down by the device"
     planned_s = sum(map(duration_ticks, segments)) / 16e6
