@@ -166,10 +166,19 @@ def test_the_time_out_follows_the_round_trip():
 def test_a_fast_line_does_not_bring_the_time_out_below_what_the_usb_bridge_needs():
     arq = GoBackN(0)
     for number in range(50):
-        send(arq, number)
+        send(arq, number, bytes(40))
         arq.on_ack(number + 1, FREE, number + 0.001)
     send(arq, 100.0)
     assert arq.deadline_s == pytest.approx(100.0 + MIN_TIMEOUT_S)
+
+
+def test_short_frames_do_not_tell_how_long_a_full_window_takes():
+    arq = GoBackN(0)
+    for number in range(50):
+        send(arq, number)
+        arq.on_ack(number + 1, FREE, number + 0.001)
+    send(arq, 100.0, bytes(40))
+    assert arq.deadline_s == pytest.approx(100.0 + INITIAL_TIMEOUT_S)
 
 
 def test_the_round_trip_of_a_copy_is_not_measured():

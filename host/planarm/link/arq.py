@@ -34,6 +34,8 @@ INITIAL_TIMEOUT_S = 0.050
 MIN_TIMEOUT_S = 0.020
 MAX_TIMEOUT_S = 0.250
 BACK_OFF = 1.5
+LONG_FRAME_BYTES = 30
+"""As long as this, a frame tells what a full window of them takes."""
 
 _SEQUENCE = 256
 _LEAD = bytes([DELIMITER])  # ends whatever noise the device has gathered since the last frame
@@ -97,7 +99,7 @@ class GoBackN:
         self._least_s = 0.0
         self._deviation_s = 0.0
         self.round_trip_s = 0.0  # the newest that was measured
-        self._timeout_s = INITIAL_TIMEOUT_S
+        self._timeout_s = self._least_timeout_s = INITIAL_TIMEOUT_S
         self._patience = 1.0  # grows with every time-out in a row
         self._timer_s = 0.0
         self._deaf_until_s = float("-inf")
@@ -151,7 +153,7 @@ class GoBackN:
         self.answered_s = newest.first_sent_s
         self.quickest_s = min(self.quickest_s, now_s - newest.first_sent_s)
         if newest.first:
-            self._measure(now_s - newest.sent_s)
+            self._measure(now_s - newest.sent_s, len(newest.frame))
         self._timer_s = now_s
         return Ack.ADVANCED, b""
 
@@ -196,8 +198,12 @@ class GoBackN:
         self.counters.bytes_sent += len(copies)
         return copies
 
-    def _measure(self, round_trip_s: float) -> None:
-        """RFC 6298, section 2; only such a measurement ends the growth of the time-out (section 5)."""
+    def _measure(self, round_trip_s: float, frame_bytes: int) -> None:
+        """RFC 6298, section 2; only such a measurement ends the growth of the time-out (section 5).
+
+        Short frames alone on a slow line come back long before the frames of a full window would: until a long one was
+        measured the time-out gets no shorter than it began.
+        """
         self._patience = 1.0
         self.round_trip_s = round_trip_s
         if self._smoothed_s is None:
@@ -206,4 +212,5 @@ class GoBackN:
             self._deviation_s += (abs(self._smoothed_s - round_trip_s) - self._deviation_s) / 4
             self._smoothed_s += (round_trip_s - self._smoothed_s) / 8
             self._least_s = min(self._least_s, round_trip_s)
-        self._timeout_s = min(max(self._smoothed_s + 4 * self._deviation_s, MIN_TIMEOUT_S), MAX_TIMEOUT_S)
+        self._least_timeout_s = MIN_TIMEOUT_S if frame_bytes >= LONG_FRAME_BYTES else self._least_timeout_s
+        self._timeout_s = min(max(self._smoothed_s + 4 * self._deviation_s, self._least_timeout_s), MAX_TIMEOUT_S)
