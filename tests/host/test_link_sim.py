@@ -15,7 +15,16 @@ from planarm.link.position import Certainty, StreamError, StreamFault
 from planarm.link.sim_transport import SimTransport
 from planarm.link.stream import StreamOptions
 from planarm.link.transport import Transport, open_transport
-from planarm_wire.messages import DIR_PINS, ENABLE_PIN, HOST_WINDOW_BYTES, STEP_PINS, Move, Segment
+from planarm_wire.messages import (
+    DIR_PINS,
+    EMERGENCY_CODE,
+    ENABLE_PIN,
+    HOLD_CODE,
+    HOST_WINDOW_BYTES,
+    STEP_PINS,
+    Move,
+    Segment,
+)
 from planarm_wire.steps import direction, duration_ticks, step_ticks
 
 
@@ -110,7 +119,8 @@ def test_the_line_carries_what_250000_baud_can(line):
 
 
 class NoisyLine:
-    """Damages single bytes in both directions of another transport."""
+    """Damages single bytes in both directions of another transport; makes no hold and no emergency of them, which stop
+    the arm (tests/system/test_holds.py)."""
 
     def __init__(self, line: SimTransport, chance: random.Random, probability: float) -> None:
         self._line, self._chance, self._probability = line, chance, probability
@@ -123,7 +133,8 @@ class NoisyLine:
             if kind >= 1.0:
                 out.append(byte)
             elif kind < 0.5:
-                out.append(byte ^ 1 << self._chance.randrange(8))
+                flipped = byte ^ 1 << self._chance.randrange(8)
+                out.append(byte if flipped in (HOLD_CODE, EMERGENCY_CODE) else flipped)
             elif kind < 0.75:
                 out += bytes([byte, byte])
         return bytes(out)
