@@ -36,6 +36,9 @@ constexpr uint16_t FULL_BYTES = wire::MAX_PAYLOAD_BYTES;
 // In units of a need.
 constexpr uint8_t STARVING_MARGIN = wire::STARVING_TICKS / wire::NEED_UNIT_TICKS;
 static_assert(wire::STARVING_TICKS % wire::NEED_UNIT_TICKS == 0, "whole units");
+// A product with it, less its low 16 bits, divides by the unit.
+constexpr uint16_t NEEDS_A_LAP = 0x10000 / wire::NEED_UNIT_TICKS;
+static_assert(NEEDS_A_LAP * static_cast<uint32_t>(wire::NEED_UNIT_TICKS) == 0x10000, "whole needs");
 
 constexpr uint8_t MAX_SLICES = 4;
 
@@ -117,7 +120,7 @@ Motion& current() { return hal::by_base(motion); }
 bool Motion::is_starving(uint8_t margin) const {
     if (intake::is_complete() || segment_last || queue::free_bytes() < FULL_BYTES) return false;
     const uint32_t road_ticks = intake::path_ticks() + left_ticks;
-    return multiply_high(road_ticks, 2) < static_cast<uint32_t>(need) + margin;
+    return multiply_high(road_ticks, NEEDS_A_LAP) < static_cast<uint32_t>(need) + margin;
 }
 
 // Apart from serve, whose frame on the stack lies below the deepest calls.

@@ -86,6 +86,7 @@ def assert_ends_in_every_phase(firmware: EmulatedFirmware, board: Board, stop: C
     while any(uno.pin(pin).level for pin in STEP_PINS):  # from here on every pulse has both edges
         board.run(1)
     begun = uno.snapshot()
+    stepping = set()
     for phase in ALL_PHASES:
         uno.restore(begun)
         board.edges.clear()
@@ -96,9 +97,12 @@ def assert_ends_in_every_phase(firmware: EmulatedFirmware, board: Board, stop: C
         board.run(20_000)
         for pin in STEP_PINS:
             ticks = [edge.tick for edge in board.edges if edge.pin == pin]
-            assert not ticks or ticks[-1] <= stopped + MOST_TICKS_AFTER_STOP, phase
+            if ticks:
+                stepping.add(pin)
+                assert ticks[-1] <= stopped + MOST_TICKS_AFTER_STOP, phase
             highs = [fall - rise for rise, fall in zip(ticks[::2], ticks[1::2], strict=True)]
             assert all(high >= MIN_STEP_HIGH_TICKS for high in highs), phase
+    assert stepping == set(STEP_PINS)
 
 
 def test_three_emergency_bytes_end_all_edges_within_30_us_and_cut_no_pulse(

@@ -212,5 +212,6 @@ class GoBackN:
             self._deviation_s += (abs(self._smoothed_s - round_trip_s) - self._deviation_s) / 4
             self._smoothed_s += (round_trip_s - self._smoothed_s) / 8
             self._least_s = min(self._least_s, round_trip_s)
-        self._least_timeout_s = MIN_TIMEOUT_S if frame_bytes >= LONG_FRAME_BYTES else self._least_timeout_s
+        if frame_bytes >= LONG_FRAME_BYTES:
+            self._least_timeout_s = MIN_TIMEOUT_S
         self._timeout_s = min(max(self._smoothed_s + 4 * self._deviation_s, self._least_timeout_s), MAX_TIMEOUT_S)
