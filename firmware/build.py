@@ -111,7 +111,7 @@ def require_free_registers(elf: Path, flags: list[str]) -> None:
     for function in listing.split("\n\n"):
         title, *lines = function.splitlines() or [""]
         name = title.partition("<")[2].rstrip(">:")
-        if re.fullmatch(r"__vector_(4|6|7|11|12|13|18|19)|_ZN3hal\d+(set_)?step_fraction\w+", name):
+        if re.fullmatch(r"__vector_(4|6|7|11|12|13|16|18|19)|_ZN3hal\d+(set_)?step_fraction\w+", name):
             continue
         for line in lines:
             address, _, instruction = line.partition(":\t")

@@ -8,7 +8,8 @@ from pathlib import Path
 from firmware_board import UNO, EmulatedFirmware
 from planarm_wire.boards import Board as Wiring
 
-PIN_CHANGE, SCHEDULED, STEP_1, STEP_2, LAP, RECEIVE, TRANSMIT = 4, 7, 11, 12, 13, 18, 19  # of the vectors, from 0
+# Numbers of the vectors, from 0.
+PIN_CHANGE, SCHEDULED, STEP_1, STEP_2, LAP, END_PULSES, RECEIVE, TRANSMIT = 4, 7, 11, 12, 13, 16, 18, 19
 ENTRY_CYCLES = 4
 INTERRUPTS_ON = 0x80
 CLI, WDR = b"\xf8\x94", b"\xa8\x95"

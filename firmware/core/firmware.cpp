@@ -59,7 +59,6 @@ void serve_emergency() {
     if (supervisor::clear_event() == supervisor::Event::CLEAR_KEPT) {
         fail(emergency == hal::Emergency::LINE ? wire::Fault::EMERGENCY_STOP : wire::Fault::STOP_INPUT);
     }
-    hal::emergency_latched();
     if (settings::has_option(settings::EMERGENCY_RELEASES)) power::release();
 }
 

@@ -78,8 +78,7 @@ void send_status(const session::Report& report) {
     wire::Status& told = payload<wire::Status>();
     told.mcu_ticks = motion::tell_ledger(told.ledger);
     told.state = supervisor::state();
-    told.fault = supervisor::fault();
-    hal::emergency_told();
+    told.fault = supervisor::tell_fault();
     told.detail = supervisor::fault_detail();
     told.refusal = report.refusal;
     told.refusal_seq = report.refusal_seq;

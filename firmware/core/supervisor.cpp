@@ -2,6 +2,7 @@
 
 #include "hal_base.h"
 #include "hal_flash.h"
+#include "hal_signals.h"
 #include "home.h"
 #include "motion.h"
 #include "power.h"
@@ -160,6 +161,11 @@ Event clear_event() {
         default:
             return Event::CLEAR_KEPT;
     }
+}
+
+Fault tell_fault() {
+    if (clear_event() == Event::CLEAR) hal::emergency_told();
+    return latched_fault;
 }
 
 bool allows(Event event) { return find(event) != 0; }

@@ -49,6 +49,8 @@ void reset();
 
 wire::State state();
 wire::Fault fault();
+// The same for a STATUS: from then on the host knows of an emergency before it.
+wire::Fault tell_fault();
 uint8_t fault_detail();
 
 // What a CLEAR is now: a fault that loses the position leaves nothing that the drivers could hold.

@@ -12,9 +12,8 @@ enum class Emergency : uint8_t { NONE, LINE, INPUT };
 
 // What ended all pulses; until `emergency_clear` no step is made.
 Emergency emergency();
-// Three steps, so that none is cleared that the host has not been told of: the fault is latched, a STATUS
-// tells it, CLEAR takes it back. What comes in between goes on to be told by `emergency`.
-void emergency_latched();
+// Two steps, so that none is cleared that the host has not been told of: a STATUS tells the latched fault,
+// CLEAR takes back what came before that. What came later goes on to be told by `emergency`.
 void emergency_told();
 void emergency_clear();
 

@@ -13,10 +13,11 @@ from pathlib import Path
 import pytest
 
 from firmware_board import LEAD_TICKS, UNO, Board, Schedule, end_motion, run_of, segment_of
-from firmware_tracer import INTERRUPTS_ON, LAP, PIN_CHANGE, RECEIVE, STEP_1, STEP_2, TRANSMIT, Tracer
+from firmware_tracer import END_PULSES, INTERRUPTS_ON, LAP, PIN_CHANGE, RECEIVE, STEP_1, STEP_2, TRANSMIT, Tracer
 from planarm_wire.codec import encode
 from planarm_wire.framing import encode_frame
 from planarm_wire.messages import (
+    BOARDS,
     DELIMITER,
     EMERGENCY_CODE,
     ESCAPE,
@@ -36,18 +37,22 @@ from planarm_wire.messages import (
     State,
 )
 
-IMAGE = Path(__file__).parents[2] / "firmware" / "release" / "uno.hex"
+RELEASE = Path(__file__).parents[2] / "firmware" / "release"
+IMAGE = RELEASE / "uno.hex"
 JUMP_TO_ITSELF = b"\xff\xcf"  # rjmp .-2
 
 STEP_CYCLES, ONWARD_CYCLES, REVERSED_CYCLES, IDLE_CYCLES = 75, 75, 77, 73
 MISSED_CYCLES = (82, 84)  # joint 2's interrupt goes on in that of joint 1
 HIGH_CYCLES = range(56, 60)  # nothing else runs but an instruction of the main program
 LOCK_CYCLES = 11  # of the main program; firmware/README.md, budgets
-RECEIVE_CYCLES, OVERRUN_CYCLES, FULL_CYCLES = 36, 42, 40
-HOLD_CYCLES, EMERGENCY_CYCLES = 35, 34
+RECEIVE_CYCLES, OVERRUN_CYCLES, FULL_CYCLES, FULL_OVERRUN_CYCLES = 36, 42, 39, 43
+HOLD_CYCLES, EMERGENCY_CYCLES = 35, 33
+LAST_EMERGENCY_CYCLES = {"uno": 40, "uno_slow": 40, "uno_four": 45, "cnc_shield": 36, "cnc_shield_four": 41}
 MOST_RECEIVE_CYCLES = 45
-LAST_EMERGENCY_CYCLES = 108  # no step comes after it
-CLOSED_CYCLES, OPENED_CYCLES = 12, 94  # the stop input's contact
+END_CYCLES = 20  # of what ends pulses that an emergency has found high
+BY_COMPARE = {name: board.step_pins[:2] == UNO.step_pins for name, board in BOARDS.items()}
+CLOSED_CYCLES = 12  # the stop input's contact
+OPENED_CYCLES = {"uno": 29, "uno_slow": 29, "uno_four": 34, "cnc_shield": 25, "cnc_shield_four": 30}
 TRANSMIT_CYCLES, ESCAPE_CYCLES, DELIMITER_CYCLES = 34, 39, 35
 LAP_CYCLES = 18
 WATCH_STOP_INPUT = 4  # a bit of CONFIG's options
@@ -144,30 +149,43 @@ def test_receive_interrupt(tracer: Tracer) -> None:
     assert tracer.taken(RECEIVE) == {RECEIVE_CYCLES, OVERRUN_CYCLES}
 
 
-def test_receive_interrupt_out_of_band(tracer: Tracer) -> None:
+def watching_stop_input(name: str) -> tuple[Tracer, Board]:
+    """The board at rest, with the stop input's contact closed."""
+    tracer = Tracer(RELEASE / f"{name}.hex", BOARDS[name])
+    board, joints = Board(tracer), BOARDS[name].joints
+    fast = super(Tracer, tracer).run
+    tracer.run = fast  # type: ignore[method-assign]
+    tracer.uno.pin(BOARDS[name].stop_pin).drive(0)
+    board.hello()
+    own = PinMap[BOARDS[name].pin_map.upper()]
+    board.ask(Config(own, joints, 0, WATCH_STOP_INPUT, 0, 0, 0, (4000,) * joints))
+    del tracer.run
+    return tracer, board
+
+
+@pytest.mark.parametrize("name", LAST_EMERGENCY_CYCLES)
+def test_receive_interrupt_out_of_band(name: str) -> None:
     # The third byte in a row ends all steps, as does each behind it, and another byte begins anew.
-    board = play(tracer, end_motion([segment_of(200_000, run_of(2))]))
-    tracer.done.clear()
+    tracer, board = watching_stop_input(name)
     board.receive(bytes([HOLD_CODE, *[EMERGENCY_CODE] * 4, HOLD_CODE, EMERGENCY_CODE]))
     board.run(7 * 640 + 400)
-    last = [LAST_EMERGENCY_CYCLES] * 2
+    last = [LAST_EMERGENCY_CYCLES[name]] * 2
     told = [HOLD_CYCLES, *[EMERGENCY_CYCLES] * 2, *last, HOLD_CYCLES, EMERGENCY_CYCLES]
     assert [cycles for number, cycles in tracer.done if number == RECEIVE] == told
-    assert max(RECEIVE_CYCLES, OVERRUN_CYCLES, FULL_CYCLES, HOLD_CYCLES, EMERGENCY_CYCLES) <= MOST_RECEIVE_CYCLES
+    assert max(RECEIVE_CYCLES, OVERRUN_CYCLES, FULL_CYCLES, FULL_OVERRUN_CYCLES, *told) <= MOST_RECEIVE_CYCLES
+    ends = [cycles for number, cycles in tracer.done if number == END_PULSES]
+    assert ends == ([END_CYCLES] * 2 if BY_COMPARE[name] else [])
 
 
-def test_the_stop_inputs_interrupt(tracer: Tracer) -> None:
-    board = Board(tracer)
-    stop = tracer.uno.pin(UNO.stop_pin)
-    stop.drive(0)
-    tracer.run(2000)
-    board.hello()
-    board.ask(Config(PinMap.OWN, JOINTS, 0, WATCH_STOP_INPUT, 0, 0, 0, (4000,) * JOINTS))
-    tracer.done.clear()
+@pytest.mark.parametrize("name", LAST_EMERGENCY_CYCLES)
+def test_the_stop_inputs_interrupt(name: str) -> None:
+    tracer, board = watching_stop_input(name)
     for level in (1, 0):
-        stop.drive(level)
+        tracer.uno.pin(BOARDS[name].stop_pin).drive(level)
         tracer.run(500)
-    assert [cycles for number, cycles in tracer.done if number == PIN_CHANGE] == [OPENED_CYCLES, CLOSED_CYCLES]
+    taken = [cycles for number, cycles in tracer.done if number == PIN_CHANGE]
+    assert taken == [OPENED_CYCLES[name], CLOSED_CYCLES]
+    assert tracer.taken(END_PULSES) == ({END_CYCLES} if BY_COMPARE[name] else set())
 
 
 def test_transmit_interrupt(tracer: Tracer) -> None:
@@ -200,12 +218,20 @@ def test_receive_interrupt_without_room(tracer: Tracer) -> None:
     tracer.run_until(lambda: len(received()) == 131)
     assert received() == [*[RECEIVE_CYCLES] * 128, *[FULL_CYCLES] * 2, HOLD_CYCLES]
     assert tracer.chip.pc == stop
+    # Four more while interrupts are off: one more than the USART holds.
+    tracer.done.clear()
+    board.receive(bytes(4))
+    tracer.chip.sreg &= ~INTERRUPTS_ON
+    tracer.uno.run(cycles=5 * 640)
+    tracer.chip.sreg |= INTERRUPTS_ON
+    tracer.run_until(lambda: len(received()) == 3)
+    assert set(received()) == {FULL_CYCLES, FULL_OVERRUN_CYCLES}
     tracer.chip.pc = left_at
     tracer.run = super(Tracer, tracer).run  # type: ignore[method-assign]
     board.run(100_000)
     board.receive(bytes([DELIMITER]))
     status = board.ask()
-    assert (status.state, status.ring_full) == (State.HELD, 2)
+    assert (status.state, status.ring_full, status.overruns) == (State.HELD, 5, 1)
 
 
 @pytest.mark.parametrize("ms", [5, 9, 13, 60, 200])

@@ -51,11 +51,8 @@ struct Board {
     uint8_t ring_full;
     uint8_t holds;
     uint8_t emergency_run;
-    uint8_t emergencies;
-    uint8_t emergencies_latched;
-    uint8_t emergencies_told;
-    uint8_t emergencies_cleared;
-    Emergency emergency_cause;
+    Emergency emergency;
+    bool emergency_told;
     uint8_t inputs;
     bool stop_watched;
     bool enable_active_high;
@@ -197,15 +194,13 @@ void journal_serve() {}
 
 uint8_t hold_count() { return uno.holds; }
 
-Emergency emergency() {
-    return uno.emergencies == uno.emergencies_cleared ? Emergency::NONE : uno.emergency_cause;
+Emergency emergency() { return uno.emergency; }
+
+void emergency_told() { uno.emergency_told = true; }
+
+void emergency_clear() {
+    if (uno.emergency_told) uno.emergency = Emergency::NONE;
 }
-
-void emergency_latched() { uno.emergencies_latched = uno.emergencies; }
-
-void emergency_told() { uno.emergencies_told = uno.emergencies_latched; }
-
-void emergency_clear() { uno.emergencies_cleared = uno.emergencies_told; }
 
 void watchdog_feed() {}
 
@@ -261,8 +256,8 @@ void end_pulses(hal::Emergency cause) {
     hal::steps_off();
     hal::wait_step_high();
     planarm::for_each_joint([](auto joint) { hal::step_fall<joint.NUMBER>(); });
-    ++uno.emergencies;
-    uno.emergency_cause = cause;
+    uno.emergency = cause;
+    uno.emergency_told = false;
 }
 
 // What the receive interrupt does with a byte.

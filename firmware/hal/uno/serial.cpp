@@ -23,22 +23,28 @@ static_assert((RX_RING_BYTES & (RX_RING_BYTES - 1)) == 0, "ring indices wrap by 
 alignas(RX_RING_BYTES) uint8_t ring[RX_RING_BYTES];
 
 // The place of the byte received last, that of the first which finds no room (RX_RING_BYTES behind the one to
-// be taken next), the emergency bytes in a row, counted from the high byte of the ring's address, and bytes
-// lost in the USART, all modulo 256, where IN and OUT reach them: timer 0 stands still. A boot loader may
-// have left anything there.
+// be taken next), and the emergency bytes in a row, counted from the high byte of the ring's address, all
+// modulo 256, where IN and OUT reach them: of timer 0 only the overflow is used. A boot loader may have left
+// anything there.
 #define RING_HEAD GPIOR2
 #define RING_LIMIT OCR0A
 #define EMERGENCY_RUN OCR0B
-#define OVERRUNS TCNT0
 
 volatile uint8_t ring_full;
+volatile uint8_t overruns;  // bytes lost in the USART
 
 volatile uint8_t holds;
-volatile uint8_t emergencies;  // so far, modulo 256, as the next three
-volatile Emergency emergency_cause;
-uint8_t emergencies_latched;
-uint8_t emergencies_told;
-uint8_t emergencies_cleared;
+
+// The last emergency's cause, as an interrupt wrote it, and whether the host knows.
+volatile uint8_t emergency_state;
+constexpr uint8_t CAUSE = 0x03;
+constexpr uint8_t TOLD = 0x04;
+
+// Timer 0 counts from here to its overflow once an emergency has disarmed the joints. A pulse that rose just
+// before is then at least as long as drivers need: it falls 12 cycles or more after END_TICKS.
+constexpr uint16_t END_TICKS = planarm::wire::MIN_STEP_HIGH_TICKS - 12;
+static_assert(END_TICKS < 256, "timer 0 has 8 bits");
+constexpr uint16_t END_COUNT = 256 - END_TICKS;
 
 volatile uint8_t sending_at;  // 256 less the bytes left to be sent, 0 at the end
 
@@ -51,7 +57,8 @@ void serial_init() {
     RING_HEAD = static_cast<uint8_t>(-1);
     RING_LIMIT = RX_RING_BYTES;
     EMERGENCY_RUN = static_cast<uint8_t>(reinterpret_cast<uintptr_t>(ring) >> 8);
-    OVERRUNS = 0;
+    TCNT0 = END_COUNT;
+    TIMSK0 = _BV(TOIE0);
     UBRR0 = BAUD_DIVIDER - 1;
     UCSR0A = _BV(U2X0);
     UCSR0C = _BV(UCSZ01) | _BV(UCSZ00);
@@ -82,34 +89,37 @@ void serial_send(uint8_t size) {
     UCSR0B = _BV(RXCIE0) | _BV(UDRIE0) | _BV(RXEN0) | _BV(TXEN0);
 }
 
-uint8_t serial_overruns() { return OVERRUNS; }
+uint8_t serial_overruns() { return overruns; }
 
 uint8_t serial_ring_full() { return ring_full; }
 
 uint8_t hold_count() { return holds; }
 
-Emergency emergency() { return emergencies == emergencies_cleared ? Emergency::NONE : emergency_cause; }
+Emergency emergency() { return static_cast<Emergency>(emergency_state & CAUSE); }
 
-void emergency_latched() { emergencies_latched = emergencies; }
+void emergency_told() {
+    const InterruptLock lock;
+    emergency_state |= TOLD;
+}
 
-void emergency_told() { emergencies_told = emergencies_latched; }
-
-void emergency_clear() { emergencies_cleared = emergencies_told; }
+void emergency_clear() {
+    const InterruptLock lock;
+    if ((emergency_state & TOLD) != 0) emergency_state = 0;
+}
 
 }  // namespace hal
 
-static_assert(_SFR_MEM_ADDR(TCCR1C) == _SFR_MEM_ADDR(TCCR1A) + 2, "%[tccra] + 2");
-static_assert(_SFR_MEM_ADDR(TCNT1) == _SFR_MEM_ADDR(TCCR1A) + 4, "%[tccra] + 4");
-static_assert(_SFR_MEM_ADDR(OCR1A) == _SFR_MEM_ADDR(TCCR1A) + 8, "%[tccra] + 8");
-static_assert(_SFR_MEM_ADDR(OCR1B) == _SFR_MEM_ADDR(TCCR1A) + 10, "%[tccra] + 10");
+static_assert(_SFR_MEM_ADDR(TIMSK2) == _SFR_MEM_ADDR(TIMSK1) + 1, "%[timsk] + 1");
+static_assert(static_cast<uint8_t>(hal::Emergency::LINE) == 1 && hal::ONLY_LAPS == 1 && _BV(CS00) == 1,
+              "what r30 is at the last emergency byte");
 
 // The interrupts, in assembler with registers that no other code uses: see step_interrupts.cpp.
 
-// Cycles with entry and jump: 36 for a byte stored, 40 for one that finds no room, 42 after an overrun, 35
-// for a hold, 34 for an emergency byte that is not the last. A byte comes every 640 at the fastest. Bytes
-// lost before a hold or an emergency byte are not counted. The last emergency byte, after which no step comes
-// that could be late, takes 108, with pulses of 15 us 294: no pin rises from the 32nd on, and those that are
-// high then fall the least high time later.
+// Cycles with entry and jump: 36 for a byte stored, 39 for one that finds no room, 42 and 43 of the same
+// after an overrun, 35 for a hold, 33 for an emergency byte that is not the last and 40 for the last, with
+// four joints 45. A byte comes every 640 at the fastest. Bytes lost before a hold or an emergency byte are
+// not counted. From the 31st cycle of the last emergency byte on no pin rises; those that are high timer 0's
+// interrupt takes low, once they have been so for the least high time.
 ISR(USART_RX_vect, ISR_NAKED) {
     __asm__ __volatile__(
         R"(
@@ -131,7 +141,7 @@ ISR(USART_RX_vect, ISR_NAKED) {
         ldi  r31, hi8(%[ring])
         out  %[run], r31
         st   Z, r6
-    1:  sbrc r3, %[overrun]
+        sbrc r3, %[overrun]
         rjmp 3f
     9:  movw r30, r4
         out  %[sreg], r2
@@ -142,15 +152,17 @@ ISR(USART_RX_vect, ISR_NAKED) {
         lds  r30, %[full]
         inc  r30
         sts  %[full], r30
-        rjmp 1b
-
-    3:  in   r30, %[overruns]
-        inc  r30
-        out  %[overruns], r30
+        sbrs r3, %[overrun]
         rjmp 9b
+    3:  lds  r30, %[overruns]
+        inc  r30
+        sts  %[overruns], r30
+        movw r30, r4
+        out  %[sreg], r2
+        reti
 
-    4:  tst  r30                        ; out of band
-        brne 6f
+    4:  sbrc r30, 0                     ; out of band
+        rjmp 6f
         ldi  r31, hi8(%[ring])          ; hold
         out  %[run], r31
         lds  r30, %[holds]
@@ -158,36 +170,24 @@ ISR(USART_RX_vect, ISR_NAKED) {
         sts  %[holds], r30
         rjmp 9b
 
-    6:  in   r30, %[run]                ; emergency
-        inc  r30
-        out  %[run], r30
-        cpi  r30, hi8(%[ring] + %[repeats] * 256)
-        brsh 7f
-        rjmp 9b
-
-    7:  ldi  r30, %[line]
-        mov  r3, r30
-    .Lend_pulses:                       ; for the cause in r3; the stop input's interrupt comes here, too
-        ldi  r30, %[all_disarmed]
-        sts  %[tccra], r30
-        ldi  r30, %[only_laps]
-        sts  %[timsk], r30
+    6:  in   r31, %[run]                ; emergency
+        inc  r31
+        out  %[run], r31
+        cpi  r31, hi8(%[ring] + %[repeats] * 256)
+        brlo 9b
+        sts  %[state], r30
+    .Lend_pulses:                       ; with 1 in r30; the stop input's interrupt comes here, too
         .if %[all_disarmed]
-        ldi  r30, %[high_turns]         ; a pulse that has just risen lasts as long as the drivers need
-    8:  dec  r30
-        brne 8b
-        ldi  r30, %[all_forced]
-        sts  %[tccra] + 2, r30
+        ldi  r31, %[all_disarmed]
+        sts  %[tccra], r31
+        out  %[tccr0b], r30             ; timer 0 starts
         .endif
+        sts  %[timsk], r30
         .if %[joints] > 2
-        ldi  r30, 0
-        sts  %[scheduled_on], r30
-        sts  %[timsk2], r30
+        ldi  r31, 0
+        sts  %[timsk] + 1, r31
+        sts  %[scheduled_on], r31
         .endif
-        lds  r30, %[emergencies]
-        inc  r30
-        sts  %[emergencies], r30
-        sts  %[cause], r3
         movw r30, r4
         out  %[sreg], r2
         reti
@@ -195,16 +195,15 @@ ISR(USART_RX_vect, ISR_NAKED) {
         [status] "i"(&UCSR0A), [data] "i"(&UDR0), [overrun] "i"(DOR0), [special] "M"(planarm::FIRST_SPECIAL),
         [head] "I"(_SFR_IO_ADDR(RING_HEAD)), [limit] "I"(_SFR_IO_ADDR(RING_LIMIT)),
         [run] "I"(_SFR_IO_ADDR(EMERGENCY_RUN)), [ring] "i"(hal::ring), [size] "i"(hal::RX_RING_BYTES),
-        [full] "i"(&hal::ring_full), [overruns] "I"(_SFR_IO_ADDR(OVERRUNS)), [holds] "i"(&hal::holds),
+        [full] "i"(&hal::ring_full), [overruns] "i"(&hal::overruns), [holds] "i"(&hal::holds),
         [repeats] "M"(planarm::wire::EMERGENCY_REPEATS), [all_disarmed] "i"(hal::ALL_DISARMED),
-        [all_forced] "M"(_BV(FOC1A) | _BV(FOC1B)), [tccra] "i"(&TCCR1A), [high_turns] "M"(hal::HIGH_TURNS),
-        [timsk] "i"(&TIMSK1), [only_laps] "M"(hal::ONLY_LAPS),
-        [line] "M"(static_cast<uint8_t>(hal::Emergency::LINE)), [emergencies] "i"(&hal::emergencies),
-        [cause] "i"(&hal::emergency_cause), [joints] "n"(planarm::wire::JOINTS),
-        [scheduled_on] "i"(&hal::scheduled_on), [timsk2] "i"(&TIMSK2));
+        [tccra] "i"(&TCCR1A), [tccr0b] "I"(_SFR_IO_ADDR(TCCR0B)), [timsk] "i"(&TIMSK1),
+        [state] "i"(&hal::emergency_state), [joints] "n"(planarm::wire::JOINTS),
+        [scheduled_on] "i"(&hal::scheduled_on));
 }
 
-// The stop input's contact opened: what the last emergency byte does, in 94 or 280 cycles; 12 when it closes.
+// The stop input's contact opened: what the last emergency byte does, in 29 cycles, with four joints 34; 12
+// when it closes.
 ISR(PCINT1_vect, ISR_NAKED) {
     __asm__ __volatile__(
         R"(
@@ -213,11 +212,30 @@ ISR(PCINT1_vect, ISR_NAKED) {
         in   r2, %[sreg]
         movw r4, r30
         ldi  r30, %[input]
-        mov  r3, r30
+        sts  %[state], r30
+        ldi  r30, 1
         jmp  .Lend_pulses
         )" ::[sreg] "I"(_SFR_IO_ADDR(SREG)),
         [pins] "I"(_SFR_IO_ADDR(PINC)), [stop] "I"(hal::bit_of(planarm::wire::STOP_PIN)),
-        [input] "M"(static_cast<uint8_t>(hal::Emergency::INPUT)));
+        [input] "M"(static_cast<uint8_t>(hal::Emergency::INPUT)), [state] "i"(&hal::emergency_state));
+}
+
+// Ends the pulses that an emergency has found high, in 20 cycles.
+ISR(TIMER0_OVF_vect, ISR_NAKED) {
+    __asm__ __volatile__(
+        R"(
+        mov  r4, r30
+        ldi  r30, %[all_forced]
+        sts  %[tccrc], r30
+        ldi  r30, 0
+        out  %[tccr0b], r30
+        ldi  r30, %[count]
+        out  %[tcnt0], r30
+        mov  r30, r4
+        reti
+        )" ::[all_forced] "M"(_BV(FOC1A) | _BV(FOC1B)),
+        [tccrc] "i"(&TCCR1C), [tccr0b] "I"(_SFR_IO_ADDR(TCCR0B)), [count] "M"(hal::END_COUNT),
+        [tcnt0] "I"(_SFR_IO_ADDR(TCNT0)));
 }
 
 // Cycles with entry and jump: 34 for a byte, 39 for one that must be escaped, 35 for the delimiter; once
