@@ -45,6 +45,7 @@ from planarm_wire.messages import (
     SoftLimits,
     Start,
     State,
+    Status,
 )
 from planarm_wire.rates import rate_code
 
@@ -459,6 +460,33 @@ def test_an_emergency_stop_behind_a_clear_is_kept(
     board.receive(bytes([EMERGENCY_CODE] * EMERGENCY_REPEATS))
     board.run(100_000)
     assert board.ask(Enable(1)).fault is Fault.EMERGENCY_STOP
+
+
+def test_a_clear_takes_back_no_emergency_that_no_status_has_told(emulated_firmware: EmulatedFirmware) -> None:
+    # The contact opens for an instant, at all moments about the one in which a STATUS is put together.
+    board = Board(emulated_firmware)
+    switches = Switches(emulated_firmware)
+    board.hello()
+    board.ask(replace(WIRING, options=STOP_INPUT))
+    board.ask(Enable(1))
+    uno, seq, quiet = emulated_firmware.uno, board.seq, emulated_firmware.uno.snapshot()
+    frame_ticks = len(encode_frame(seq, *encode(Query()))) * BYTE_TICKS
+    told = []
+    for phase in range(0, 8000, 40):
+        uno.restore(quiet)
+        board.forget_replies()
+        board.seq = seq
+        board.send(Query())
+        board.send(Clear())  # right behind it: what the answer to the first tells
+        board.run(frame_ticks - 1000 + phase)
+        switches.set(stop_open=True)
+        board.run(60)
+        switches.set()
+        board.run(60_000)
+        told.append(next(reply.fault for _, reply in board.replies if isinstance(reply, Status)))
+        if told[-1] is Fault.NONE:
+            assert board.ask().fault is Fault.STOP_INPUT, phase
+    assert set(told) == {Fault.NONE, Fault.STOP_INPUT}
 
 
 def test_an_emergency_beside_another_fault_is_told_as_what_loses_the_place(
