@@ -22,7 +22,6 @@ from planarm_wire.messages import (
     EMERGENCY_CODE,
     ESCAPE,
     HOLD_CODE,
-    JOINTS,
     PROTOCOL_VERSION,
     RESERVED,
     STEP_PINS,
@@ -179,7 +178,7 @@ def test_receive_interrupt_out_of_band(name: str) -> None:
 
 @pytest.mark.parametrize("name", LAST_EMERGENCY_CYCLES)
 def test_the_stop_inputs_interrupt(name: str) -> None:
-    tracer, board = watching_stop_input(name)
+    tracer, _ = watching_stop_input(name)
     for level in (1, 0):
         tracer.uno.pin(BOARDS[name].stop_pin).drive(level)
         tracer.run(500)
