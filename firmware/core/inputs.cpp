@@ -11,18 +11,20 @@ namespace inputs {
 namespace {
 
 struct Inputs {
-    uint8_t raw;       // bit j: joint j, hit
-    uint8_t steady;    // debounced
-    uint8_t left;      // hit before the motion began, and not yet open since
-    uint16_t changed;  // when `raw` did, in 256 ticks
+    uint8_t steady;  // debounced; bit j: joint j, hit
+    uint8_t left;    // hit before the motion began, and not yet open since
+    uint8_t once;    // those that have not been as `steady` since the last turn
+    uint8_t twice;   // nor since the one before
+    uint8_t turned;  // when, in 256 ticks, modulo 256
 };
 
 Inputs state;
 
-// In 256 ticks, modulo a second; one more for what that cuts off.
-constexpr uint16_t STEADY = wire::DEBOUNCE_TICKS / 256 + 2;
+// Two turns are the time that a change must last, in 256 ticks; it counts at the third.
+constexpr uint8_t TURN = wire::DEBOUNCE_TICKS / 512 + 1;
+static_assert((2 * TURN - 1) * 256UL >= wire::DEBOUNCE_TICKS, "one less for what the division cuts off");
 
-uint16_t now_256() { return static_cast<uint16_t>(clock::pass_ticks() >> 8); }
+uint8_t now_256() { return static_cast<uint8_t>(clock::pass_ticks() >> 8); }
 
 constexpr uint8_t JOINTS_MASK = (1 << wire::JOINTS) - 1;
 
@@ -38,20 +40,22 @@ bool is_set(uint8_t bits, uint8_t joint) { return ((bits >> joint) & 1) != 0; }
 
 void reset() {
     Inputs& at = hal::by_base(state);
-    at.raw = at.steady = at.left = read();
-    at.changed = now_256();
+    at.steady = at.left = read();
 }
 
 void serve() {
     Inputs& at = hal::by_base(state);
-    const uint8_t now = read();
-    if (now != at.raw) {
-        at.raw = now;
-        at.changed = now_256();
-    } else if (at.steady != now && static_cast<uint16_t>(now_256() - at.changed) >= STEADY) {
-        at.steady = now;
-        at.left &= now;
-    }
+    const uint8_t differs = read() ^ at.steady;
+    at.once &= differs;
+    at.twice &= differs;
+    const uint8_t now = now_256();
+    if (static_cast<uint8_t>(now - at.turned) < TURN) return;
+    at.turned = now;
+    at.steady ^= at.twice;
+    at.left &= at.steady;
+    const uint8_t waiting = differs ^ at.twice;
+    at.twice = at.once;
+    at.once = waiting;
 }
 
 void excuse_hit() { state.left = state.steady; }

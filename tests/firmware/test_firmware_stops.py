@@ -51,6 +51,7 @@ from planarm_wire.rates import rate_code
 
 BYTE_TICKS = 10 * 16_000_000 // BAUD
 MOST_TICKS_AFTER_STOP = 480  # 30 us
+MOST_DEBOUNCE_TICKS = DEBOUNCE_TICKS * 3 // 2 + 8000  # and a pass of the main program
 ACTIVE_HIGH, RELEASES, STOP_INPUT, LIMITS, OPENS = 1, 2, 4, 8, 16
 WIRING = Config(PinMap.OWN, JOINTS, 0, 0, 0, 160_000, 0, (160_000, 160_000))
 
@@ -324,6 +325,40 @@ def test_a_limit_hit_in_motion_is_a_fault_that_says_which_and_a_bounce_is_none(f
     status = board.ask()
     assert (status.fault, status.detail, status.inputs & 3) == (Fault.LIMIT_SWITCH, 1, 0b10)
     assert status.ledger.position_usteps[0] == board.position_at(0, board.now)
+
+
+@pytest.mark.parametrize("half_ticks", [8000, 16_000, 32_000, 60_000, 78_000])
+def test_a_contact_that_chatters_blinds_no_other(firmware: Firmware, half_ticks: int) -> None:
+    board = Board(firmware)
+    switches = Switches(firmware)
+    board.hello()
+    board.ask(replace(WIRING, options=LIMITS))
+    board.ask(Enable(1))
+    board.run(WAKE_TICKS)
+    moving(board)
+    hit_at = board.now + 6 * half_ticks
+    turn = 0
+    while board.now < hit_at + MOST_DEBOUNCE_TICKS:
+        switches.set(hit=(board.now >= hit_at) << 1 | turn % 2)
+        board.run(half_ticks)
+        turn += 1
+    status = board.ask()
+    assert (status.fault, status.detail, status.inputs & 3) == (Fault.LIMIT_SWITCH, 1, 0b10)
+
+
+def test_a_switch_counts_once_it_has_been_hit_for_long_enough(firmware: Firmware) -> None:
+    # At any moment against the board's own rhythm: what is shorter never counts, what is half as long more always.
+    board = Board(firmware)
+    switches = Switches(firmware)
+    board.hello()
+    board.ask(replace(WIRING, options=LIMITS))
+    for phase in range(0, DEBOUNCE_TICKS // 2, 1900):
+        for lasting, counts in ((DEBOUNCE_TICKS - 200, False), (MOST_DEBOUNCE_TICKS, True)):
+            board.run(3 * DEBOUNCE_TICKS + phase)
+            switches.set(hit=0b10)
+            board.run(lasting)
+            switches.set()
+            assert bool(board.ask_now().inputs & 0b10) is counts, (phase, lasting)
 
 
 def test_an_arm_leaves_a_switch_and_is_watched_again(firmware: Firmware) -> None:
