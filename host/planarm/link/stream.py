@@ -1,26 +1,19 @@
 """Streams a plan: asks, clears, enables, fills the queue, starts, keeps the queue full, and checks what was executed.
 
-A machine of explicit phases on top of a `Session`; no I/O. The device's queue is filled by credit: a reply tells the
-free bytes at the moment of its acknowledgement, so what may still be sent is that number less what is in flight. When
-no message is in flight the device is asked for its status, no sooner than the segments now executing can have made room
-for the next message.
-
-`hold`, `resume`, `override` and `stop` may be called at any time; each says what the device is to do, and its status
-says when it is done. A hold that nobody here asked for, as a damaged byte may cause, is taken back; one that was asked
-for and is not there is sent again: its byte overtakes frames, so a RESUME that the device has not read yet undoes it.
+A machine of explicit phases on top of a `Session`; no I/O. `link.feed` keeps the device's queue full; when no message
+is in flight the device is asked for its status, no sooner than the segments now executing can have made room for the
+next message. `hold`, `resume`, `override` and `stop` may be called at any time (`link.orders`).
 """
 
-from bisect import bisect_left
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 from math import ceil
 
-from planarm.errors import CertificateError, LinkError
+from planarm.errors import LinkError
 from planarm.link.clock_sync import Span
 from planarm.link.course import Course
+from planarm.link.feed import Feed
+from planarm.link.orders import Orders
 from planarm.link.pace import PERCENT, Pace
-from planarm.link.packing import Packer
-from planarm.link.plan_steps import LOOK_AHEAD
 from planarm.link.position import MissedStartError
 from planarm.link.progress import progress_of
 from planarm.link.session import Session
@@ -33,23 +26,18 @@ from planarm.link.stream_values import (
     clear_drops_words,
     soft_limits_at,
 )
-from planarm_wire.codec import encoded_bytes
 from planarm_wire.messages import (
-    HOLD_CODE,
     QUEUE_FRAME_BYTES,
     TICKS_HZ,
     Clear,
     Enable,
     Fault,
-    HostMessage,
     Override,
     Query,
-    Resume,
     Segment,
     Start,
     State,
     Status,
-    Stop,
 )
 from planarm_wire.rates import Allowance
 from planarm_wire.steps import duration_ticks
@@ -86,7 +74,6 @@ class Stream:
         self.began_s: Span | None = None
         self.least_queued = len(segments)
         self.stopped = False
-        self.unasked_holds = 0
         self._start_sent_s, self._lead_ticks_sent = 0.0, 0
         self._awake_s = 0.0
         self._warn = warn
@@ -97,13 +84,10 @@ class Stream:
         self._on_progress = on_progress
         self._seen: Status | None = None
         self._told_resent = 0
-        self._packer = Packer(session, segments, self._options.allowances)
+        self._feed = Feed(session, self.course, self._options.allowances, self._options.ahead_s)
+        self._orders = Orders(session)
         self._joining = joining
-        self._hold_wanted = False
-        self._hold_seq = 0
-        self._stop_wanted = False
         self._enabled = False
-        self._orders: list[HostMessage] = []
 
     @property
     def released_spread_usteps(self) -> tuple[int, ...]:
@@ -113,12 +97,17 @@ class Stream:
     @property
     def sent_segments(self) -> int:
         """Segments sent so far, those of an earlier session included."""
-        return self._packer.sent
+        return self._feed.sent
 
     @property
     def round_trip_s(self) -> float:
         """From a frame to its acknowledgement, as last measured; 0 before."""
         return self._session.round_trip_s
+
+    @property
+    def unasked_holds(self) -> int:
+        """How often the device held by itself and was told to go on."""
+        return self._orders.unasked_holds
 
     @property
     def done(self) -> bool:
@@ -134,35 +123,27 @@ class Stream:
 
     def hold(self) -> None:
         """Slow down along the path and rest there; in effect within a few milliseconds, whatever is in flight."""
-        self._hold_wanted = True
-        self._orders = [order for order in self._orders if not isinstance(order, Resume)]
-        self._send_hold()
-
-    def _send_hold(self) -> None:
-        self._session.send_out_of_band(HOLD_CODE)
-        self._hold_seq = self._session.next_seq
+        self._orders.hold()
 
     def resume(self) -> None:
         """Go on after a hold."""
-        self._hold_wanted = False
-        self._orders.append(Resume())
+        self._orders.resume()
 
     def override(self, percent: int) -> None:
         """Let the path clock run at 1 to 100 % of the planned rate."""
         self.pace.asked_percent = percent
-        self._orders.append(Override(percent))
+        self._orders.override(Override(percent))
 
     def stop(self, *, quick: bool = False) -> None:
         """Slow down along the path and drop the rest of the plan; `stopped` tells when the arm rests."""
-        self._stop_wanted = True
-        self._orders.append(Stop(int(quick)))
+        self._orders.stop(quick=quick)
 
     def keep_back(self, first: int) -> None:
         """Send no segment from number `first` on until `go_on_with` tells others; those before have been, or will be.
 
         Where nothing comes in time the device slows down along its path and rests before that segment.
         """
-        self._packer.keep_back(first)
+        self._feed.keep_back(first)
 
     def go_on_with(self, segments: Sequence[Segment], allowances: Sequence[Allowance]) -> None:
         """Take another plan from here on: its segments that were sent are the same.
@@ -173,16 +154,11 @@ class Stream:
         Raises:
             CertificateError: it has other first segments, or does not end as a plan does.
         """
-        sent = self.sent_segments
-        if tuple(segments[:sent]) != self.course.segments[:sent] or len(allowances) != len(segments):
-            raise CertificateError(f"a plan to go on with has other segments than the {sent} that were sent")
-        self.course.take(segments)
-        self._options = replace(self._options, allowances=tuple(allowances))
-        self._packer.go_on_with(segments, allowances)
+        self._feed.go_on_with(segments, allowances)
         executed = self.course.executed
-        order = self.pace.set_again(self.course.segments[executed:], self._options.allowances[executed:])
+        order = self.pace.set_again(self.course.segments[executed:], self._feed.allowances[executed:])
         if order is not None:
-            self._orders.append(order)
+            self._orders.override(order)
 
     @property
     def deadline_s(self) -> float:
@@ -244,7 +220,7 @@ class Stream:
             raise LinkError(f"the device does not hold the motion any more: it is {self._status.state.name.lower()}")
         self._session.guarded = True
         self.course.before = joining.before
-        self._packer.sent = joining.accepted_segments
+        self._feed.join_at(joining.accepted_segments)
         self.started_s = self.course.executed_s = now_s
         self.phase = Phase.RUNNING
         self._follow(now_s)
@@ -280,9 +256,9 @@ class Stream:
         self.phase = Phase.FILLING
 
     def _fill(self, now_s: float) -> None:
-        self._send_segments(now_s)
+        self._feed.send(self._status, now_s)
         if self._session.idle:  # the queue is full, or the whole plan is in it
-            self.pace.set(self.course.segments, self.sent_segments, self._options.allowances, now_s)
+            self.pace.set(self.course.segments, self.sent_segments, self._feed.allowances, now_s)
             if self._status.override_percent != self.pace.percent:
                 self._session.send(Override(self.pace.percent), now_s)
             self._start_sent_s, self._lead_ticks_sent = now_s, self._lead_ticks(now_s)
@@ -310,7 +286,7 @@ class Stream:
 
     def _run(self, now_s: float) -> None:
         if self._status.state is State.READY:
-            self.stopped = self._stop_wanted and self.executed_segments < self.total_segments
+            self.stopped = self._orders.stop_wanted and self.executed_segments < self.total_segments
             if not self.stopped:
                 self.course.check_done(self._status.ledger)
             if self._options.release_when_done:
@@ -318,9 +294,9 @@ class Stream:
                 self._session.send(Enable(0), now_s)
             self.phase = Phase.RELEASING
             return
-        self._send_orders(now_s)
-        if not self._stop_wanted:
-            self._send_segments(now_s)
+        self._orders.send(self._status.state, now_s)
+        if not self._orders.stop_wanted:
+            self._feed.send(self._status, now_s)
         if not self._session.idle:
             return
         if now_s >= self._stall_due_s():
@@ -332,65 +308,30 @@ class Stream:
         if self._session.idle:
             self.phase = Phase.DONE
 
-    # -- sending ------------------------------------------------------------------------------------------------------
-
-    def _send_orders(self, now_s: float) -> None:
-        """Send what the owner asked for, a hold that is not there again, and take back one that nobody asked for."""
-        if self._hold_is_missing and self._session.idle and self._session.next_seq != self._hold_seq:
-            self._send_hold()
-        held = self._status.state in (State.HOLDING, State.HELD)
-        if held and not self._hold_wanted and not self._orders and self._session.idle:
-            self.unasked_holds += 1
-            self._orders.append(Resume())
-        while self._orders and self._session.fits(self._orders[0]):
-            self._session.send(self._orders.pop(0), now_s)
-
-    @property
-    def _hold_is_missing(self) -> bool:
-        """Whether the device runs where it is to rest; by a status that may be older than the hold."""
-        running = self._status.state in (State.RUNNING, State.STARVED)
-        return self._hold_wanted and not self._stop_wanted and running
-
-    def _send_segments(self, now_s: float) -> None:
-        while (message := self._packer.next_message()) is not None:
-            if self._packer.payload_bytes > self._credit or not self._session.fits(message):
-                return
-            if self._wanted_from() > self.executed_segments:
-                return
-            self._session.send(message, now_s)
-            self._packer.take()
-
-    @property
-    def _credit(self) -> int:
-        """Payload bytes that the device's queue still takes."""
-        return self._status.free_bytes - self._session.room_in_flight
-
-    def _wanted_from(self) -> int:
-        """Return how many segments have to be executed before the device is to have the next."""
-        if self._options.ahead_s is None or not self._options.allowances or self._status.state is State.STARVED:
-            return 0
-        executed, ends_ticks = self.executed_segments, self.course.ends_ticks
-        running = self._options.allowances[executed : executed + LOOK_AHEAD]
-        need_ticks = max((allowance.need_ticks for allowance in running), default=0.0)
-        ahead_ticks = need_ticks + self._options.ahead_s * TICKS_HZ
-        return bisect_left(ends_ticks, ends_ticks[self.sent_segments] - ahead_ticks)
+    # -- asking -------------------------------------------------------------------------------------------------------
 
     def _poll_due_s(self) -> float:
         """When the device can have room for the next message, or can have ended."""
-        if self._hold_is_missing:
+        if self._orders.hold_is_missing(self._status.state):
             return self._session.status_s + MIN_POLL_S
-        executed = until = self.executed_segments
-        if self._packer.next_message() is None:
-            until = self.total_segments
-        else:  # a segment gives its bytes back when it is begun
-            wanted = self._packer.payload_bytes - self._credit
-            while wanted > 0 and until < self.total_segments:
-                wanted -= encoded_bytes(self.course.segments[until])
-                until += 1
-            until = max(until, self._wanted_from())
-        wait_s = self.course.between_s(executed, until)
+        wait_s = self.course.between_s(self.executed_segments, self._feed.room_from(self._status))
         wait_s *= PERCENT / max(1, min(self._status.rate_percent, self.pace.percent))
         return self._session.status_s + min(max(wait_s, MIN_POLL_S), MAX_POLL_S)
+
+    def _stall_due_s(self) -> float:
+        """When the running segment should long have ended; never while the path clock rests or runs slowly."""
+        if self._status.state in AT_EASE or self._status.rate_percent < PERCENT:
+            return float("inf")
+        running = min(self.executed_segments, self.total_segments - 1)
+        ticks = duration_ticks(self.course.segments[running]) + max(self._options.lead_ticks, self._lead_ticks_sent)
+        return self.course.executed_s + ticks / TICKS_HZ + self._session.limits.silence_s
+
+    def _stall_words(self, now_s: float) -> str:
+        waited_s, of = now_s - self.course.executed_s, self.total_segments
+        return (
+            f"the device answers but executes nothing: segment {self.executed_segments} of {of} has not ended"
+            f" {waited_s:.2f} s after the one before it; reset the board"
+        )
 
     # -- following the device -----------------------------------------------------------------------------------------
 
@@ -448,18 +389,3 @@ class Stream:
         if self.began_s is not None and path_s.least > 0.0:
             by_now_s = self._session.board_clock.host_s(-round(path_s.least * TICKS_HZ)).most
             self.began_s = Span(self.began_s.least, min(self.began_s.most, by_now_s))
-
-    def _stall_due_s(self) -> float:
-        """When the running segment should long have ended; never while the path clock rests or runs slowly."""
-        if self._status.state in AT_EASE or self._status.rate_percent < PERCENT:
-            return float("inf")
-        running = min(self.executed_segments, self.total_segments - 1)
-        ticks = duration_ticks(self.course.segments[running]) + max(self._options.lead_ticks, self._lead_ticks_sent)
-        return self.course.executed_s + ticks / TICKS_HZ + self._session.limits.silence_s
-
-    def _stall_words(self, now_s: float) -> str:
-        waited_s, of = now_s - self.course.executed_s, self.total_segments
-        return (
-            f"the device answers but executes nothing: segment {self.executed_segments} of {of} has not ended"
-            f" {waited_s:.2f} s after the one before it; reset the board"
-        )
