@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Iterable
 
 from firmware_board import LEAD_TICKS, WAKE_TICKS, Board, Firmware, Schedule
 from planarm_wire.codec import encoded_bytes
 from planarm_wire.messages import (
+    HOLD_CODE,
     JOINTS,
     QUEUE_FRAME_BYTES,
     Config,
     Enable,
     Fault,
     PinMap,
+    Resume,
     Segments,
     Start,
     State,
@@ -63,6 +66,16 @@ class Player:
                 return status
         assert not states, f"not in {states}: {self.board.ask()}"
         return self.board.ask()
+
+    def hold_and_resume(self, waits: Iterable[int], pause: int) -> None:
+        """Hold after each wait, rest for the pause, and go on; fewer times where the motion has ended. All in ticks."""
+        for wait in waits:
+            self.play_until(self.board.now + wait)
+            self.board.receive(bytes([HOLD_CODE]))
+            if self.play_until(self.board.now + 10**9, State.HELD, State.READY).state is State.READY:
+                return
+            self.board.run(pause)
+            self.board.send(Resume())
 
     def assert_all_steps_made(self) -> None:
         status = self.play_until(self.board.now + 10**9, State.READY, State.FAULT)

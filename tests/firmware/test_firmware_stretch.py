@@ -165,13 +165,7 @@ def test_the_devices_clock_goes_on_while_the_motions_stands(firmware: Firmware) 
 def test_any_number_of_holds_loses_no_step(native_firmware: NativeFirmware, waits: list[int], pause: int) -> None:
     player = Player(native_firmware, UNEQUAL)
     player.start()
-    for wait in waits:
-        player.play_until(player.board.now + wait)
-        player.board.receive(bytes([HOLD_CODE]))
-        if player.play_until(player.board.now + 10**9, State.HELD, State.READY).state is State.READY:
-            break
-        player.board.run(pause)
-        player.board.send(Resume())
+    player.hold_and_resume(waits, pause)
     player.assert_all_steps_made()
     for joint in range(JOINTS):
         signs = [sign for _, sign in Schedule.of(UNEQUAL.segments).steps[joint]]
@@ -241,13 +235,7 @@ def test_a_slow_move_below_the_start_stop_speed_rests_at_once(firmware: Firmware
 def test_slow_moves_lose_no_step_when_held(native_firmware: NativeFirmware, waits: list[int], pause: int) -> None:
     player = Player(native_firmware, slow_motion())
     player.start()
-    for wait in waits:
-        player.play_until(player.board.now + wait)
-        player.board.receive(bytes([HOLD_CODE]))
-        if player.play_until(player.board.now + 10**9, State.HELD, State.READY).state is State.READY:
-            break
-        player.board.run(pause)
-        player.board.send(Resume())
+    player.hold_and_resume(waits, pause)
     player.assert_all_steps_made()
     for joint in range(JOINTS):
         rises = player.board.rises(joint)

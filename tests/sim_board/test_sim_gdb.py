@@ -225,22 +225,28 @@ def run_gdb(elf, port, *commands):
     return shown.stdout + shown.stderr
 
 
+def served(uno):
+    """Serve gdb in a thread; returns it and its port."""
+    ports, there = [], threading.Event()
+
+    def announce(port):
+        ports.append(port)
+        there.set()
+
+    server = threading.Thread(target=lambda: uno.serve_gdb(0, announce=announce), daemon=True)
+    server.start()
+    assert there.wait(LONG_S)
+    return server, ports[0]
+
+
 @pytest.fixture
 def gdb(program):
     """Run avr-gdb's commands on a new board; returns what it printed, and the board."""
     uno = Uno.from_elf(program)
 
     def run(*commands):
-        ports, there = [], threading.Event()
-
-        def announce(port):
-            ports.append(port)
-            there.set()
-
-        server = threading.Thread(target=lambda: uno.serve_gdb(0, announce=announce), daemon=True)
-        server.start()
-        assert there.wait(LONG_S)
-        printed = run_gdb(program, ports[0], *commands)
+        server, port = served(uno)
+        printed = run_gdb(program, port, *commands)
         server.join(LONG_S)
         assert not server.is_alive(), "it ends when the debugger has gone"
         return printed, uno
@@ -290,16 +296,8 @@ def test_avr_gdb_watches_a_variable(gdb):
 
 def test_ctrl_c_stops_a_running_board(program):
     uno = Uno.from_elf(program)
-    ports, there = [], threading.Event()
-
-    def announce(port):
-        ports.append(port)
-        there.set()
-
-    server = threading.Thread(target=lambda: uno.serve_gdb(0, announce=announce), daemon=True)
-    server.start()
-    assert there.wait(LONG_S)
-    with socket.create_connection(("127.0.0.1", ports[0]), timeout=LONG_S) as debugger:
+    server, port = served(uno)
+    with socket.create_connection(("127.0.0.1", port), timeout=LONG_S) as debugger:
         debugger.sendall(packet(b"c") + INTERRUPT)
         assert debugger.recv(1) == b"+"
         answer = b""

@@ -73,9 +73,8 @@ loop:   mov r18, r16
 """
 
 
-def sweep(instruction: str, start: int) -> tuple[np.ndarray, np.ndarray]:
-    """Result and SREG for all pairs, r16 (D) slow and r17 (R) fast."""
-    chip = Chip(assemble(SWEEP.format(instruction)))
+def stored_for_all_pairs(chip: Chip, start: int, columns: int) -> np.ndarray:
+    """What the program's loop stores, a row for each column, for all pairs: r16 (D) slow and r17 (R) fast."""
     rows = []
     for d in range(256):
         chip.pc = 0
@@ -83,15 +82,14 @@ def sweep(instruction: str, start: int) -> tuple[np.ndarray, np.ndarray]:
         chip.registers[17] = 0
         chip.registers[20] = start
         assert chip.run_to(chip.cycle + 10_000) is StopCause.BREAK
-        rows.append(chip.sram[:512].copy())
-    pairs = np.concatenate(rows).reshape(-1, 2).astype(int)
-    return pairs[:, 0], pairs[:, 1]
+        rows.append(chip.sram[: 256 * columns].copy())
+    return np.concatenate(rows).reshape(-1, columns).astype(int).T
 
 
 @pytest.mark.parametrize("start", STARTS)
 @pytest.mark.parametrize("instruction", EXPECTED)
 def test_two_operands_over_all_pairs(instruction, start):
-    result, flags = sweep(instruction, start)
+    result, flags = stored_for_all_pairs(Chip(assemble(SWEEP.format(instruction))), start, 2)
     expected_result, expected_flags = EXPECTED[instruction](start)
     np.testing.assert_array_equal(result, expected_result)
     np.testing.assert_array_equal(flags, expected_flags)
@@ -166,15 +164,7 @@ PRODUCT = (
 def test_products_over_all_pairs(instruction, start):
     # FMUL* shift the 16-bit product left by one; C is the product's bit 15 before the shift, Z of the result.
     chip = Chip(assemble(PRODUCT.format(instruction)))
-    rows = []
-    for d in range(256):
-        chip.pc = 0
-        chip.registers[16] = d
-        chip.registers[17] = 0
-        chip.registers[20] = start
-        assert chip.run_to(chip.cycle + 10_000) is StopCause.BREAK
-        rows.append(chip.sram[:768].copy())
-    low, high, flags = np.concatenate(rows).reshape(-1, 3).astype(int).T
+    low, high, flags = stored_for_all_pairs(chip, start, 3)
     signed_d = np.where(D > 127, D - 256, D) if instruction not in ("mul", "fmul") else D
     signed_r = np.where(R > 127, R - 256, R) if instruction in ("muls", "fmuls") else R
     product = (signed_d * signed_r) & 0xFFFF
@@ -190,15 +180,7 @@ def test_word_arithmetic_over_all_values(instruction, constant):
     body = f"mov r24, r17\nmov r25, r16\nout 0x3F, r20\n{instruction} r24, {constant}\nin r19, 0x3F\n"
     body += "st X+, r24\nst X+, r25\nst X+, r19\n"
     chip = Chip(assemble("ldi r26, 0\nldi r27, 1\nloop:\n" + body + "inc r17\nbrne loop\nbreak"))
-    rows = []
-    for high in range(256):
-        chip.pc = 0
-        chip.registers[16] = high
-        chip.registers[17] = 0
-        chip.registers[20] = 0xE0
-        assert chip.run_to(chip.cycle + 10_000) is StopCause.BREAK
-        rows.append(chip.sram[:768].copy())
-    low, high_after, flags = np.concatenate(rows).reshape(-1, 3).astype(int).T
+    low, high_after, flags = stored_for_all_pairs(chip, 0xE0, 3)
     before = D << 8 | R
     after = (before + constant if instruction == "adiw" else before - constant) & 0xFFFF
     was, now = bit(before, 15), bit(after, 15)

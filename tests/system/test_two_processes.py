@@ -14,11 +14,17 @@ from planarm.stepping.expand import expand
 from planarm_sim.trace import read_vcd
 
 ROOT = Path(__file__).resolve().parents[2]
+CASE1 = str(ROOT / "examples/table1_case1.toml")
 LIMIT_S = 120
 
 
 def command(*words):
     return [sys.executable, "-c", "from planarm.cli.main import main; main()", *words]
+
+
+def planarm(folder, *words):
+    """Run a command in the folder to its end."""
+    return subprocess.run(command(*words), capture_output=True, text=True, cwd=folder, timeout=LIMIT_S, check=False)
 
 
 @pytest.mark.skipif(os.name != "posix", reason="pseudo-terminals need a POSIX system")
@@ -31,23 +37,7 @@ def test_run_streams_through_a_pty_to_the_emulator(tmp_path):
         first_line = emulator.stdout.readline()
         assert first_line.startswith("/dev/"), first_line
         assert link.resolve() == Path(first_line.strip())
-        ran = subprocess.run(
-            command(
-                "run",
-                str(ROOT / "examples/table1_case1.toml"),
-                "--port",
-                str(link),
-                "--at-start",
-                "--json",
-                "--out",
-                "out",
-            ),
-            capture_output=True,
-            text=True,
-            cwd=tmp_path,
-            timeout=LIMIT_S,
-            check=False,
-        )
+        ran = planarm(tmp_path, "run", CASE1, "--port", str(link), "--at-start", "--json", "--out", "out")
     finally:
         emulator.send_signal(signal.SIGINT)
         rest = emulator.communicate(timeout=LIMIT_S)[0]
@@ -69,7 +59,7 @@ def test_a_killed_run_is_resumed_by_another_process_and_no_step_is_lost(tmp_path
     )
     try:
         emulator.stdout.readline()
-        words = ("run", str(ROOT / "examples/table1_case1.toml"), "--port", str(link), "--at-start", "--out", "out")
+        words = ("run", CASE1, "--port", str(link), "--at-start", "--out", "out")
         with subprocess.Popen(command(*words), stderr=subprocess.PIPE, text=True, cwd=tmp_path) as run:
             said = []
             for line in run.stderr:
@@ -78,14 +68,7 @@ def test_a_killed_run_is_resumed_by_another_process_and_no_step_is_lost(tmp_path
                     run.kill()
                     break
             assert said[-1].startswith("stream: 25 %"), said
-        resumed = subprocess.run(
-            command("resume", "out", "--json"),
-            capture_output=True,
-            text=True,
-            cwd=tmp_path,
-            timeout=LIMIT_S,
-            check=False,
-        )
+        resumed = planarm(tmp_path, "resume", "out", "--json")
     finally:
         emulator.send_signal(signal.SIGINT)
         rest = emulator.communicate(timeout=LIMIT_S)[0]
