@@ -1,5 +1,6 @@
 """Settings of all tests."""
 
+import gc
 import os
 from collections.abc import Callable
 
@@ -10,6 +11,14 @@ from hypothesis import settings
 settings.register_profile("same-examples", derandomize=True)
 if os.environ.get("CI"):
     settings.load_profile("same-examples")
+
+# Thousands of collected tests and Numba's trees live to the end: to look through them again and again for what is no
+# longer used took a tenth of the time.
+gc.set_threshold(50_000, 10, 10)
+
+
+def pytest_collection_finish() -> None:
+    gc.freeze()
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import functools
 import importlib
 import importlib.util
 import os
 import shutil
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
 from types import ModuleType
 
@@ -55,12 +57,18 @@ def orderer() -> ModuleType:
 
 
 @pytest.fixture(scope="session")
-def uno_image(builder: ModuleType, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The Uno's image built by avr-gcc, its elf beside it."""
+def built_image(builder: ModuleType, tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Path]:
+    """`built_image(board)`: its image built by avr-gcc, once a session; its elf beside it."""
     if shutil.which("avr-gcc") is None:
         pytest.skip("avr-gcc is not installed (Debian: gcc-avr, avr-libc): no image is built")
-    image: Path = builder.build_image(tmp_path_factory.mktemp("image"), "uno")
-    return image
+    out = tmp_path_factory.mktemp("images")
+    return functools.cache(lambda board: builder.build_image(out, board))
+
+
+@pytest.fixture(scope="session")
+def uno_image(built_image: Callable[[str], Path]) -> Path:
+    """The Uno's image built by avr-gcc, its elf beside it."""
+    return built_image("uno")
 
 
 @pytest.fixture(scope="session")

@@ -9,6 +9,7 @@ import re
 import shutil
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
 from types import ModuleType
 
@@ -80,9 +81,9 @@ def test_images_leave_room(board: str, most_bytes: int) -> None:
 @needs_avr_gcc
 @pytest.mark.parametrize("board", ["uno", "uno_slow", "cnc_shield", "uno_four", "cnc_shield_four"])
 def test_memory_and_the_deepest_stack_leave_a_quarter_of_a_kilobyte(
-    builder: ModuleType, tmp_path: Path, board: str
+    builder: ModuleType, built_image: Callable[[str], Path], board: str
 ) -> None:
-    image = builder.build_image(tmp_path, board)
+    image = built_image(board)
     stack, path = deepest_stack_bytes(image.with_suffix(".elf"))
     assert path[0] == "main" and path[-1].startswith("__vector_")
     assert stack >= 100
@@ -114,12 +115,14 @@ def test_both_builds_give_the_released_image(tmp_path: Path) -> None:
 
 
 @needs_avr_gcc
-def test_the_place_of_the_build_does_not_matter(tmp_path: Path) -> None:
+def test_the_place_of_the_build_does_not_matter(
+    builder: ModuleType, built_image: Callable[[str], Path], tmp_path: Path
+) -> None:
     copy = tmp_path / "elsewhere" / "firmware"
     shutil.copytree(FIRMWARE, copy, ignore=shutil.ignore_patterns("build", ".pio", "__pycache__"))
-    build("avr", tmp_path / "a")
-    build("avr", tmp_path / "b", copy)
-    assert (tmp_path / "a" / "uno.hex").read_bytes() == (tmp_path / "b" / "uno.hex").read_bytes()
+    build("avr", tmp_path, copy)
+    for board in builder.BOARDS:
+        assert (tmp_path / f"{board}.hex").read_bytes() == built_image(board).read_bytes()
 
 
 @needs_avr_gcc
@@ -187,11 +190,10 @@ def locked_cycles(listing: str) -> dict[str, int]:
 
 @needs_avr_gcc
 @pytest.mark.parametrize("board", LOCK_CYCLES)
-def test_locks_that_are_met_while_joints_step_are_short(tmp_path: Path, board: str) -> None:
+def test_locks_that_are_met_while_joints_step_are_short(built_image: Callable[[str], Path], board: str) -> None:
     # firmware/README.md, budgets: 11 cycles and 2.
-    build("avr", tmp_path)
     listing = subprocess.run(
-        ["avr-objdump", "-d", "-C", "--no-show-raw-insn", str(tmp_path / f"{board}.elf")],
+        ["avr-objdump", "-d", "-C", "--no-show-raw-insn", str(built_image(board).with_suffix(".elf"))],
         capture_output=True,
         text=True,
         check=True,
