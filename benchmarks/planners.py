@@ -377,7 +377,7 @@ def draw_growth(target: Path) -> None:
     right.set_ylim(bottom=0.0)
     for axes in (left, right):
         dress(axes)
-        axes.legend(frameon=False, fontsize=7)
+        axes.legend(frameon=False, fontsize=7, handlelength=3.2)  # long enough to tell dashed from drawn
     save(figure, target)
 
 

@@ -24,6 +24,17 @@ def test_the_help_has_every_command_once():
     assert all(text.count(f"\n  {name} ") == 1 for name in listed)
 
 
+def test_each_commands_page_begins_with_what_it_is_for_and_ends_with_the_exit_codes():
+    [commands] = [one for one in build_parser()._actions if one.dest == "command"]
+    for name, command in commands.choices.items():
+        usage, about, *_ = command.format_help().split("\n\n")
+        assert usage.startswith(f"usage: planarm {name} ")
+        assert about[0].isupper() or about.startswith(f"planarm {name} "), about
+        assert max(map(len, about.splitlines())) < 80
+        assert command.format_help().rstrip().endswith("differ from the plan")
+        assert all(one.help for one in command._actions)
+
+
 def test_without_words_the_help_is_told_and_it_is_no_success(capsys):
     code, said = told([], capsys)
     assert (code, said.out) == (2, "")

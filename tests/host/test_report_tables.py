@@ -24,6 +24,8 @@ def test_units_come_from_the_keys() -> None:
             "bytes_sent": 43210,
             "min_pulse_high_us": np.float64(2.5),
             "s": 3,
+            "line_asked_bytes_s": 1432.3,
+            "max_acceleration_rad_s2": 20.5,
         }
     ) == [
         "scene Table I, case 1",
@@ -33,6 +35,8 @@ def test_units_come_from_the_keys() -> None:
         "bytes sent 43,210",
         "min pulse high 2.5 µs",
         "s 3",
+        "line asked 1432.3 bytes/s",
+        "max acceleration 20.5 rad/s²",
     ]
 
 

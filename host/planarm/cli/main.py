@@ -10,7 +10,7 @@ import sys
 from collections.abc import Sequence
 
 import planarm
-from planarm.cli.parser import EXIT_CODES, Commands, Parser
+from planarm.cli.parser import EXIT_CODES, Commands, Parser, add_command
 from planarm.errors import OutputError, PlanarmError, UsageError
 from planarm_wire.messages import BOARDS
 
@@ -112,7 +112,7 @@ def report_error(error: PlanarmError, as_json: bool) -> None:
 
 
 def _add_plan(commands: Commands) -> None:
-    command = commands.add_parser("plan", help="plan a scene and write the certified plan", epilog=EXIT_CODES)
+    command = add_command(commands, "plan", "plan a scene and write the certified plan")
     _add_scene(command)
     command.add_argument("-o", "--output", metavar="FILE.plan", help="where to write the plan")
     command.add_argument(
@@ -122,7 +122,7 @@ def _add_plan(commands: Commands) -> None:
 
 
 def _add_run(commands: Commands) -> None:
-    command = commands.add_parser("run", help="plan, stream, verify and report", epilog=EXIT_CODES)
+    command = add_command(commands, "run", "plan, stream, verify and report")
     _add_scene(command)
     _add_port(command)
     command.add_argument("--out", metavar="DIR", help="folder for report.html, plan, trace, summary and pictures")
@@ -140,9 +140,7 @@ def _add_run(commands: Commands) -> None:
 
 
 def _add_replan(commands: Commands) -> None:
-    command = commands.add_parser(
-        "replan", help="carry a scene out and plan again when obstacles appear", epilog=EXIT_CODES
-    )
+    command = add_command(commands, "replan", "carry a scene out and plan again when obstacles appear")
     _add_scene(command)
     _add_port(command)
     command.add_argument("--arrivals", metavar="FILE", help="[[obstacles]] with at_s, seconds since the motion began")
@@ -151,8 +149,8 @@ def _add_replan(commands: Commands) -> None:
 
 
 def _add_stream(commands: Commands) -> None:
-    command = commands.add_parser("stream", help="stream a certified plan", epilog=EXIT_CODES)
-    command.add_argument("plan", metavar="FILE.plan")
+    command = add_command(commands, "stream", "stream a certified plan")
+    command.add_argument("plan", metavar="FILE.plan", help="what 'planarm plan' wrote")
     command.add_argument("--arm", metavar="SCENE", help="the arm that is connected: a plan for another one is refused")
     _add_port(command)
     _add_at_start(command)
@@ -161,12 +159,12 @@ def _add_stream(commands: Commands) -> None:
 
 
 def _add_resume(commands: Commands) -> None:
-    command = commands.add_parser(
+    command = add_command(
+        commands,
         "resume",
-        help="go on with a run that broke off",
-        description="Tell how well the arm's position is known after a run that broke off: exact, bounded (+-n steps)\n"
+        "go on with a run that broke off",
+        details="Tell how well the arm's position is known after a run that broke off: exact, bounded (+-n steps) "
         "or lost. From an exact position the rest of the path is executed, from a bounded one after a yes.",
-        epilog=EXIT_CODES,
     )
     command.add_argument("run", metavar="RUN", help="the run's folder")
     _add_port(command)
@@ -176,10 +174,10 @@ def _add_resume(commands: Commands) -> None:
 
 
 def _add_recorder(commands: Commands) -> None:
-    command = commands.add_parser("dump", help="a run's journal, or a byte stream, as readable messages")
+    command = add_command(commands, "dump", "a run's journal, or a byte stream, as readable messages")
     command.add_argument("file", metavar="RUN|FILE", help="a run's folder, a journal, or bytes that a host sent")
     _add_json(command)
-    command = commands.add_parser("replay", help="play what a run sent into the emulated board", epilog=EXIT_CODES)
+    command = add_command(commands, "replay", "play what a run sent into the emulated board")
     command.add_argument("run", metavar="RUN", help="the run's folder")
     command.add_argument("--firmware", metavar="HEX", help="the image to run (default: the released firmware)")
     command.add_argument("--vcd", metavar="FILE", help="write the pins' waveforms")
@@ -187,21 +185,21 @@ def _add_recorder(commands: Commands) -> None:
 
 
 def _add_board(commands: Commands) -> None:
-    command = commands.add_parser("doctor", help="ports with their lasting names, rights, other programs, tools, disk")
+    command = add_command(commands, "doctor", "ports with their lasting names, rights, other programs, tools, disk")
     command.add_argument("--port", metavar="URL", help="ask the board there, too")
     _add_json(command)
-    command = commands.add_parser("flash", help="write the released image to an Uno, and verify it", epilog=EXIT_CODES)
+    command = add_command(commands, "flash", "write the released image to an Uno, and verify it")
     command.add_argument("--port", metavar="DEVICE", required=True, help="the board's device")
     command.add_argument("--board", choices=tuple(BOARDS), default="uno", help="whose released image (docs/wiring.md)")
     command.add_argument("--image", metavar="HEX", help="another image; it is not asked who it is")
     _add_json(command)
-    command = commands.add_parser(
+    command = add_command(
+        commands,
         "stop",
-        help="stop the motion along its path, from any terminal",
-        description="Slow down along the path and drop the rest; the position is kept. A program that has the port is\n"
-        "asked to do it. --emergency ends all pulses at once: the position is lost. A real emergency stop cuts\n"
+        "stop the motion along its path, from any terminal",
+        details="Slow down along the path and drop the rest; the position is kept. A program that has the port is "
+        "asked to do it. --emergency ends all pulses at once: the position is lost. A real emergency stop cuts "
         "the motors' supply.",
-        epilog=EXIT_CODES,
     )
     command.add_argument("--port", metavar="URL", required=True, help="the board's device or URL")
     command.add_argument("--quick", action="store_true", help="as fast as the segments allow")
@@ -218,7 +216,7 @@ def _add_arm(commands: Commands) -> None:
         "jog": "turn one joint by an angle",
         "goto": "go to a point on a certified path",
     }
-    parsers = {name: commands.add_parser(name, help=text, epilog=EXIT_CODES) for name, text in described.items()}
+    parsers = {name: add_command(commands, name, text) for name, text in described.items()}
     for command in parsers.values():
         command.add_argument("scene", metavar="SCENE", help="scene file (TOML) of the arm that is connected")
     parsers["zero"].add_argument(
@@ -243,9 +241,7 @@ def _add_arm(commands: Commands) -> None:
 
 
 def _add_envelope(commands: Commands) -> None:
-    command = commands.add_parser(
-        "envelope", help="map accuracy and speed over the workspace; largest payload and feed"
-    )
+    command = add_command(commands, "envelope", "map accuracy and speed over the workspace; largest payload and feed")
     _add_scene(command)
     command.add_argument("--out", metavar="DIR", help="folder for envelope.json and envelope.png")
     command.add_argument("--maps-only", action="store_true", help="leave out payload and feed, which plan many times")
@@ -253,7 +249,7 @@ def _add_envelope(commands: Commands) -> None:
 
 
 def _add_emulate(commands: Commands) -> None:
-    command = commands.add_parser("emulate", help="run a flash image on the emulated Uno behind a virtual serial port")
+    command = add_command(commands, "emulate", "run a flash image on the emulated Uno behind a virtual serial port")
     command.add_argument("--firmware", metavar="HEX|ELF", help="the image to run (default: the released firmware)")
     command.add_argument("--board", choices=tuple(BOARDS), help="whose released image (default: the scene's, or uno)")
     command.add_argument("--bootloader", metavar="HEX|ELF", help="a boot loader, so that avrdude can upload")
@@ -282,7 +278,7 @@ def _add_emulate(commands: Commands) -> None:
 
 
 def _add_compare(commands: Commands) -> None:
-    command = commands.add_parser("compare", help="compute a paper's table anew beside the published one")
+    command = add_command(commands, "compare", "compute a paper's table anew beside the published one")
     command.add_argument(
         "table",
         nargs="?",
@@ -307,12 +303,12 @@ def _add_compare(commands: Commands) -> None:
 
 
 def _add_timing(commands: Commands) -> None:
-    command = commands.add_parser(
+    command = add_command(
+        commands,
         "timing",
-        help="judge a recording of the STEP and DIR lines",
-        description="planarm timing CAPTURE: hold a VCD or CSV recording against a plan and a driver's rules.\n"
+        "judge a recording of the STEP and DIR lines",
+        details="planarm timing CAPTURE: hold a VCD or CSV recording against a plan and a driver's rules.\n"
         "planarm timing diff A B: hold recording B against recording A.",
-        epilog=EXIT_CODES,
     )
     command.add_argument("captures", metavar="CAPTURE", nargs="+", help="VCD, or CSV of Saleae Logic 2 or sigrok")
     command.add_argument("--plan", metavar="FILE.plan", help="the plan that was executed")
@@ -328,7 +324,7 @@ def _add_timing(commands: Commands) -> None:
 
 
 def _add_campaign(commands: Commands, name: str, purpose: str) -> None:
-    command = commands.add_parser(name, help=purpose, epilog=EXIT_CODES)
+    command = add_command(commands, name, purpose)
     command.add_argument("file", metavar=f"{name.upper()}.toml", help="what to run; see docs/scale.md")
     command.add_argument("--out", metavar="DIR", help="folder of the results (out/NAME)")
     command.add_argument("--resume", action="store_true", help="run only what is missing there")
@@ -339,16 +335,14 @@ def _add_campaign(commands: Commands, name: str, purpose: str) -> None:
 
 
 def _add_report(commands: Commands) -> None:
-    command = commands.add_parser(
-        "report", help="the page of a run; tables and plots of a sweep's or campaign's results"
-    )
+    command = add_command(commands, "report", "the page of a run; tables and plots of a sweep's or campaign's results")
     command.add_argument("results", metavar="DIR", help="the folder of the run or of the results")
     command.add_argument("--out", metavar="DIR", help="folder for report.html (the run's own) or for the plots")
     _add_json(command)
 
 
 def _add_setup(commands: Commands) -> None:
-    command = commands.add_parser("setup", help="ask for an arm, try its joints, and write its scene")
+    command = add_command(commands, "setup", "ask for an arm, try its joints, and write its scene")
     command.add_argument("file", metavar="FILE.toml", help="the scene to write")
     command.add_argument("--force", action="store_true", help="write over a file that is there")
     _add_port(command)
@@ -356,11 +350,12 @@ def _add_setup(commands: Commands) -> None:
 
 
 def _add_calibrate(commands: Commands) -> None:
-    command = commands.add_parser(
+    command = add_command(
+        commands,
         "calibrate",
-        help="link lengths and zero angles from touched points",
-        description="Fit link lengths and zero angles to points that the tip has touched, at least two more than\n"
-        "there are links: read from a CSV file with the head motor1_usteps,motor2_usteps,x_cm,y_cm (as many\n"
+        "link lengths and zero angles from touched points",
+        details="Fit link lengths and zero angles to points that the tip has touched, at least two more than "
+        "there are links: read from a CSV file with the head motor1_usteps,motor2_usteps,x_cm,y_cm (as many "
         "motors as joints), or with --port touched now.\n"
         "Whether a run lost steps tells 'planarm home SCENE --prove', by the limit switches.",
     )
@@ -375,7 +370,7 @@ def _add_calibrate(commands: Commands) -> None:
 
 
 def _add_explain(commands: Commands) -> None:
-    command = commands.add_parser("explain", help="what an error's, check's or fault's code means, and what helps")
+    command = add_command(commands, "explain", "what an error's, check's or fault's code means, and what helps")
     command.add_argument(
         "code", metavar="CODE", nargs="?", help="such as E202, C12, F2 or R2; without it, all are listed"
     )
@@ -383,13 +378,14 @@ def _add_explain(commands: Commands) -> None:
 
 
 def _add_completion(commands: Commands) -> None:
-    command = commands.add_parser(
+    command = add_command(
+        commands,
         "completion",
-        help="print a completion script for a shell",
-        description='For bash: eval "$(planarm completion bash)". For zsh the same. For fish:\n'
+        "print a completion script for a shell",
+        details='For bash: eval "$(planarm completion bash)". For zsh the same. For fish:\n'
         "planarm completion fish | source",
     )
-    command.add_argument("shell", choices=("bash", "zsh", "fish"))
+    command.add_argument("shell", choices=("bash", "zsh", "fish"), help="whose words they are")
 
 
 def _positive(text: str) -> float:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 from collections.abc import Iterable, Sequence
 from difflib import get_close_matches
+from textwrap import fill
 from typing import Any, NoReturn, TypeAlias
 
 from planarm.errors import UsageError
@@ -12,6 +13,9 @@ from planarm.errors import UsageError
 EXIT_CODES = """exit codes:
   0 ok    2 bad input    3 no path    4 cannot be timed or certified
   5 link    6 device fault    7 executed steps differ from the plan"""
+
+LEAST_TERMINAL = 79
+"""Columns that every terminal shows without a break."""
 
 TRY_IT = """try it:
   planarm run examples/table1_case1.toml       on the emulated Uno; writes out/table1_case1-chs/report.html
@@ -104,6 +108,20 @@ class Parser(argparse.ArgumentParser):
 
 
 Commands: TypeAlias = "argparse._SubParsersAction[Parser]"
+
+
+def add_command(commands: Commands, name: str, purpose: str, details: str = "") -> Parser:
+    """Add a command, whose own page begins with what it is for and ends with the exit codes.
+
+    Args:
+        commands: those of the program.
+        name: the command's.
+        purpose: what it is for, as the list of all commands says.
+        details: what its own page says instead, a line for each paragraph.
+    """
+    paragraphs = (details or f"{purpose[0].upper()}{purpose[1:]}.").splitlines()
+    about = "\n".join(fill(paragraph, LEAST_TERMINAL, break_on_hyphens=False) for paragraph in paragraphs)
+    return commands.add_parser(name, help=purpose, description=about, epilog=EXIT_CODES)
 
 
 def meant(word: str, known: Iterable[str]) -> str:

@@ -24,16 +24,19 @@ UNITS: Final = {
     "usteps": "micro-steps",
     "bytes": "bytes",
     "percent": "%",
+    "ppm": "ppm",
 }
 """Units by the last word of a key."""
+RATES: Final = {"s": "/s", "s2": "/s²"}
+"""What a key's last word says behind a unit, as in `bytes_s`."""
 
 
 def summary_table(summary: Mapping[str, Any], title: str | None = None) -> Table:
     """Return a two-column table of a summary: names in words, values with the units of their keys.
 
-    The unit is the key's last word, as in `path_length_cm`. Mappings inside are flattened. Entries of a list stand on
-    one line with slashes between, or on a line each where they are mappings. None reads "not measured", truth values
-    "yes" or "no", the latter in red.
+    The unit is the key's last word, as in `path_length_cm`, or its last two, as in `line_asked_bytes_s`. Mappings
+    inside are flattened. Entries of a list stand on one line with slashes between, or on a line each where they are
+    mappings. None reads "not measured", truth values "yes" or "no", the latter in red.
     """
     from rich import box
     from rich.table import Table
@@ -83,9 +86,17 @@ def _rows(summary: Mapping[str, Any], prefix: str) -> Iterator[tuple[str, str]]:
         if isinstance(value, Mapping):
             yield from _rows(value, f"{prefix}{' '.join(words)}: ")
             continue
-        unit = UNITS.get(words[-1], "") if len(words) > 1 else ""
-        name = " ".join(words[:-1] if unit else words)
+        name, unit = _name_and_unit(words)
         yield prefix + name, _text(value, unit)
+
+
+def _name_and_unit(words: Sequence[str]) -> tuple[str, str]:
+    """Part a key's words; a key that is a unit alone is a name."""
+    if len(words) > 2 and words[-1] in RATES and words[-2] in UNITS:
+        return " ".join(words[:-2]), UNITS[words[-2]] + RATES[words[-1]]
+    if len(words) > 1 and words[-1] in UNITS:
+        return " ".join(words[:-1]), UNITS[words[-1]]
+    return " ".join(words), ""
 
 
 def _text(value: Any, unit: str) -> str:  # noqa: ANN401 - a summary holds whatever JSON holds
