@@ -73,7 +73,8 @@ def load_plan(path: Path) -> StoredPlan:
             f"{path}: is no plan: byte {error.start} is no UTF-8; make one with 'planarm plan'"
         ) from error
     except (ValueError, RecursionError) as error:
-        raise PlanFileError(f"{path}: is no plan: {error}; make one with 'planarm plan'") from error
+        of_it = f" {path} -o FILE.plan" if path.suffix == ".toml" else ""  # a scene in a plan's place
+        raise PlanFileError(f"{path}: is no plan: {error}; make one with 'planarm plan{of_it}'") from error
     if not isinstance(body, dict) or "format" not in body:
         raise PlanFileError(f"{path}: is no plan; make one with 'planarm plan'")
     if body["format"] != FORMAT:

@@ -9,8 +9,9 @@ import time
 
 import pytest
 
+from planarm.cli.commands import build_parser
 from planarm.cli.completion import SCRIPTS, commands_of
-from planarm.cli.main import build_parser, main
+from planarm.cli.main import main
 
 COMMANDS = commands_of(build_parser())
 HOMELESS = {"PATH": os.environ["PATH"], "HOME": "/nonexistent", "TERM": "dumb", "LANG": "C.UTF-8"}

@@ -4,7 +4,8 @@ from itertools import chain
 
 import pytest
 
-from planarm.cli.main import build_parser, main
+from planarm.cli.commands import build_parser
+from planarm.cli.main import main
 from planarm.cli.parser import USES, meant
 
 ARM = "tests/scenarios/arm.toml"
@@ -51,6 +52,12 @@ def test_without_words_the_help_is_told_and_it_is_no_success(capsys):
         (["run", ARM, "--planner", "ch"], "'ch' is none of a_star, .*any_angle; did you mean chs?"),
         (["run", ARM, "more"], "nothing takes 'more'; 'planarm run --help'"),
         (["run", "--port"], "--port: expected one argument"),
+        (["jog", ARM, "1", "ten"], "DEGREES: 'ten' given, a number expected"),
+        (["jog", ARM, "1", "nan"], "DEGREES: 'nan' given, a number expected"),
+        (["jog", ARM, "0", "10"], "JOINT: '0' given, a whole number above 0 expected"),
+        (["goto", ARM, "inf", "1"], "X: 'inf' given, a number expected"),
+        (["plan", ARM, "--seed", "1.5"], "--seed: '1.5' given, a whole number expected"),
+        (["emulate", "--seconds", "-1"], "--seconds: '-1' given, a number above 0 expected"),
     ],
 )
 def test_what_was_meant_is_said(words, said, capsys):
@@ -69,6 +76,7 @@ def test_what_was_meant_is_said(words, said, capsys):
         (["envelope", ARM, "--out", ARM], "arm.toml is a file; give the path of a folder"),
         (["campaign", "examples/sweeps/line_faults.toml", "--out", ARM], "arm.toml is a file; give the path of"),
         (["stream", "none.plan"], "none.plan: cannot be read"),
+        (["jog", ARM, "1", "361"], "361 degrees given, but its limits are only"),
         (["timing", "none.vcd"], "give the path of a VCD"),
         (["timing", "diff", ARM, "none.vcd"], "none.vcd: cannot be read"),
         (["resume", "none"], "give the folder of a run"),
@@ -83,6 +91,14 @@ def test_what_cannot_be_is_refused_before_anything_is_done(words, said, capsys, 
     code, out = told(words, capsys)
     assert code == 2
     assert said in out.err
+
+
+@pytest.mark.parametrize(("port", "named"), [("sim", "sim"), ("SIM:/", "SIM:/"), ("", "''")])
+def test_a_port_that_may_mean_the_emulator_is_told_how_it_is_called(port, named, capsys, monkeypatch, pytestconfig):
+    monkeypatch.chdir(pytestconfig.rootpath)
+    code, out = told(["status", ARM, "--port", port], capsys)
+    assert code == 5
+    assert f"port {named}: not found (the emulator in this process is sim://)" in out.err
 
 
 def test_nothing_is_meant_where_nothing_is_near():

@@ -151,3 +151,12 @@ def _field_names(kind, place="scene"):
     for field in fields(kind):
         yield f"{place}.{field.name}"
         yield from _field_names(hints[field.name], f"{place}.{field.name}")
+
+
+def test_a_scene_in_a_plans_place_is_told_what_makes_a_plan_of_it(tmp_path):
+    scene = tmp_path / "arm.toml"
+    scene.write_text('name = "arm"\n')
+    with pytest.raises(
+        PlanFileError, match=r"arm\.toml: is no plan: .*; make one with 'planarm plan .*arm\.toml -o FILE"
+    ):
+        load_plan(scene)

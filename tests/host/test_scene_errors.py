@@ -78,6 +78,7 @@ WRONG = [
         "obstacles[1].vertices_cm",
         ["shape, center_cm, diameter_cm"],
     ),
+    ("diameter_cm = 10", "radius_cm = 5", "obstacles[1].radius_cm", ["'diameter_cm' expected, twice the radius"]),
     # missing keys and tables
     ("link_width_cm = 0.8", "", "arm.link_width_cm", ["missing", "a number above 0", "centimetres"]),
     ('elbow = "up"', "", "arm.elbow", ["missing", "'up', 'down', 'either'"]),
@@ -127,6 +128,8 @@ WRONG = [
     ("center_cm = [35, 18]", "center_cm = [35, 180000]", "obstacles[1].center_cm", ["180000 given", "-10000 to 10000"]),
     ("gear_ratio = 5", "gear_ratio = 0", "joints[1].gear_ratio", ["0 given", "above 0"]),
     ("steps_per_rev = 200", "steps_per_rev = 0", "joints[1].steps_per_rev", ["0 given", "from 1 to"]),
+    ("microsteps = 16", "microsteps = 32", "joints[1].microsteps", ["32 given", "1, 2, 4, 8, 16", "'a4988'"]),
+    ("microsteps = 16", "microsteps = 12", "joints[1].microsteps", ["12 given", "1, 2, 4, 8, 16", "'a4988'"]),
     ("microsteps = 16", "microsteps = 257", "joints[1].microsteps", ["257 given", "from 1 to 256"]),
     ("max_speed_deg_s = 101", "max_speed_deg_s = 0", "joints[2].max_speed_deg_s", ["0 given", "above 0"]),
     (
@@ -224,6 +227,11 @@ def test_a_single_table_where_several_are_meant_is_told_so():
     with pytest.raises(SceneError, match=r"write \[\[obstacles\]\] with two brackets") as caught:
         parse_scene(text, "wrong.toml")
     assert caught.value.key == "obstacles"
+
+
+def test_a_plan_in_a_scenes_place_is_told_where_it_belongs():
+    with pytest.raises(SceneError, match="it looks like a plan, which 'planarm stream' takes"):
+        parse_scene('{\n "format": 4\n}', "my.plan")
 
 
 def test_a_file_that_is_not_there_is_a_scene_error(tmp_path):

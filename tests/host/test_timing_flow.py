@@ -126,7 +126,7 @@ def test_two_recordings_are_compared_across_formats_and_clocks(planned, tmp_path
         (["a.csv", "b.csv"], "give one capture, or 'diff' and two captures"),
         (["diff", "a.csv"], "give one capture, or 'diff' and two captures"),
         (["diff", "a.csv", "a.csv", "--plan", "x.plan"], "--plan goes with one capture"),
-        (["a.csv", "--tolerance-us", "0"], "0 is not above 0"),
+        (["a.csv", "--tolerance-us", "0"], "'0' given, a number above 0 expected"),
         (["a.csv", "--plan", "a.csv"], "is no plan"),
         (["a.csv", "--map", "step1=Channel 0", "--map", "dir1=Channel 1", "--driver", "x99"], "no driver 'x99'"),
     ],

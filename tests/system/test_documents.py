@@ -9,7 +9,8 @@ from pathlib import Path
 import pytest
 
 from documents import Typed, Written, instructions
-from planarm.cli.main import build_parser, main
+from planarm.cli.commands import build_parser
+from planarm.cli.main import main
 
 ROOT = Path(__file__).resolve().parents[2]
 README, TUTORIAL = ROOT / "README.md", ROOT / "docs" / "tutorial.md"

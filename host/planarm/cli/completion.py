@@ -29,7 +29,7 @@ class Command:
 
 def execute(options: argparse.Namespace) -> int:
     """Print the script."""
-    from planarm.cli.main import build_parser
+    from planarm.cli.commands import build_parser
 
     print(SCRIPTS[options.shell](commands_of(build_parser())), end="")
     return 0

@@ -100,7 +100,8 @@ def _open(url: str, baud: int) -> serial.SerialBase:
 
 def not_found(url: str) -> str:
     """Say that there is no such port, and which there are."""
-    return f"port {url}: not found; serial ports found here: {_found()}"
+    emulator = " (the emulator in this process is sim://)" if url.lower().strip(":/") in ("", "sim") else ""
+    return f"port {url or repr(url)}: not found{emulator}; serial ports found here: {_found()}"
 
 
 def no_device(url: str) -> str:

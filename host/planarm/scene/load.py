@@ -35,6 +35,7 @@ from planarm.scene.types import (
     Subset,
     WorkspaceSpec,
 )
+from planarm_wire.drivers import DRIVERS
 
 ROOT_KEYS = (
     "name",
@@ -83,7 +84,8 @@ MOVES: tuple[Moves, ...] = ("proved", "cells", "nodes")
 OBJECTIVES: tuple[Objective, ...] = ("length", "joint_travel", "time")
 LENGTH_ONLY = ("chaos_a_star", "theta_star", "lazy_theta_star")
 """Algorithms that search by length, whatever else is wanted."""
-DRIVERS = ("a4988", "drv8825", "tmc2208", "tmc2209", "dm542", "tb6600")
+SET_BY_PINS_ALONE = ("a4988", "drv8825")
+"""Drivers that have no micro-steps but their sheet's: a Trinamic's interface and a box's switches set others, too."""
 NEIGHBOURS: dict[Algorithm, tuple[int, ...]] = {
     "a_star": (8,),
     "modified_a_star": (24, 48),
@@ -133,7 +135,8 @@ def parse_scene(text: str, source: str) -> Scene:
     try:
         data = tomllib.loads(text)
     except (ValueError, RecursionError) as problem:  # TOMLDecodeError; numbers of 4301 digits; a thousand brackets
-        raise SceneError(source, "", f"is not valid TOML: {problem}") from problem
+        plan = "; it looks like a plan, which 'planarm stream' takes" if text.lstrip().startswith("{") else ""
+        raise SceneError(source, "", f"is not valid TOML: {problem}{plan}") from problem
     return scene_from_toml(data, source)
 
 
@@ -333,11 +336,16 @@ def _joints(root: Table, links: int) -> tuple[JointSpec, ...]:
 
 def _joint(table: Table) -> JointSpec:
     jerk = table.number("max_jerk_deg_s3", 0.0, at_least=0.0, at_most=1e9)
+    driver = table.choice("driver", tuple(DRIVERS), "a4988")
+    microsteps = table.integer("microsteps", 16, at_least=1, at_most=256)
+    if driver in SET_BY_PINS_ALONE and microsteps not in DRIVERS[driver].microsteps:
+        known = ", ".join(map(str, DRIVERS[driver].microsteps))
+        table.reject("microsteps", microsteps, f"one of {known} (driver {driver!r} has no others)")
     return JointSpec(
         steps_per_rev=table.integer("steps_per_rev", 200, at_least=1, at_most=100_000),
-        microsteps=table.integer("microsteps", 16, at_least=1, at_most=256),
+        microsteps=microsteps,
         gear_ratio=table.number("gear_ratio", 1.0, above=0.0, at_most=10_000.0),
-        driver=table.choice("driver", DRIVERS, "a4988"),
+        driver=driver,
         max_speed_rad_s=radians(table.number("max_speed_deg_s", above=0.0, at_most=1e6)),
         max_acceleration_rad_s2=radians(table.number("max_acceleration_deg_s2", above=0.0, at_most=1e6)),
         reversed=table.flag("reversed", False),

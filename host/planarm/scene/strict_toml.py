@@ -273,9 +273,11 @@ def _unknown(key: str, keys: Sequence[str]) -> str:
         stem = known.removesuffix(f"_{unit}")
         if unit and key in (stem, *(f"{stem}_{other}" for other in OTHER_UNITS)):
             return f"wrong unit: {known!r} expected, in {UNITS[unit]}"
+    if key.startswith("radius") and "diameter_cm" in keys:
+        return f"unknown key; 'diameter_cm' expected, twice the radius, in {UNITS['cm']}"
     close = get_close_matches(key, keys, 1)
-    hint = f"did you mean {close[0]!r}? " if close else ""
-    return f"unknown key; {hint}The keys here are {_listed(keys)}"
+    listed = f"he keys here are {_listed(keys)}"
+    return f"unknown key; did you mean {close[0]!r}? T{listed}" if close else f"unknown key; t{listed}"
 
 
 def unit_of(key: str) -> str:
