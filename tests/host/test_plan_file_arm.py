@@ -107,7 +107,7 @@ def test_the_command_refuses_before_it_opens_the_port(scene, plan, tmp_path, cap
 
     save_plan(stored(plan), tmp_path / "small.plan")
     other = tmp_path / "other.toml"
-    Path(other).write_text(SMALL_SCENE.replace("microsteps = 16", "microsteps = 32", 1))
+    Path(other).write_text(SMALL_SCENE.replace("microsteps = 16", "microsteps = 8", 1))
     with pytest.raises(SystemExit) as left:
         main(["stream", str(tmp_path / "small.plan"), "--arm", str(other), "--port", "/no/such/port"])
     assert left.value.code == 4

@@ -18,6 +18,9 @@ COLOURS: Final = "cividis"
 """Even steps of lightness, and the same for those who do not tell red from green."""
 
 
+WIDTH_IN: Final = 11.0
+
+
 class CellMap(NamedTuple):
     """One map to draw."""
 
@@ -73,7 +76,9 @@ def draw_cell_maps(
 ) -> None:
     """Draw maps over one workspace side by side, two in a row."""
     rows = (len(maps) + 1) // 2
-    figure = new_figure(11.0, 1.2 + rows * 11.0 * 0.42 * min(1.0, np.ptp(y_cm) / np.ptp(x_cm)) + 0.7 * rows)
+    # A map takes three quarters of its half of the width; its title, numbers and names are 1 inch high.
+    map_in = 0.75 * 0.5 * WIDTH_IN * float(np.ptp(y_cm) / np.ptp(x_cm))
+    figure = new_figure(WIDTH_IN, 0.5 + rows * (1.0 + map_in))
     figure.suptitle(title, x=0.01, ha="left", fontsize=13, fontweight="bold", color=INK)
     half = 0.5 * float(x_cm[1] - x_cm[0])
     extent = (x_cm[0] - half, x_cm[-1] + half, y_cm[0] - half, y_cm[-1] + half)
@@ -81,7 +86,7 @@ def draw_cell_maps(
         axes = figure.add_subplot(rows, 2, number)
         shown = np.minimum(one.values, one.most)
         image = axes.imshow(shown, origin="lower", extent=extent, cmap=COLOURS, aspect="equal", interpolation="nearest")
-        axes.plot(*base_cm, marker="o", markersize=5, color=INK)
+        axes.plot(*base_cm, marker="o", markersize=5, color=INK, clip_on=False)
         dress(axes)
         axes.grid(visible=False)
         set_title(axes, one.title)
