@@ -103,20 +103,22 @@ def code_start(elf: Path) -> str:
 def require_free_registers(elf: Path, flags: list[str]) -> None:
     """Raise BuildError if any code but the interrupts uses a register that `flags` keep for them (-ffixed-rN).
 
-    The flags bind our own compiler only; the libraries of the compiler are linked as they are.
+    The flags bind our own compiler only; the libraries of the compiler are linked as they are. Nor may the interrupts,
+    which save none of r2 to r15, use one of these that is not kept for them.
     """
-    numbers = [flag.removeprefix("-ffixed-r") for flag in flags if flag.startswith("-ffixed-r")]
-    kept = re.compile(rf"\br(?:{'|'.join(numbers)})\b")
+    kept = {int(flag.removeprefix("-ffixed-r")) for flag in flags if flag.startswith("-ffixed-r")}
+    lent = set(range(2, 16)) - kept
     listing = run(["avr-objdump", "-d", "--no-show-raw-insn", f"--start-address={code_start(elf)}", str(elf)])
     for function in listing.split("\n\n"):
         title, *lines = function.splitlines() or [""]
         name = title.partition("<")[2].rstrip(">:")
-        if re.fullmatch(r"__vector_(4|6|7|11|12|13|16|18|19)|_ZN3hal\d+(set_)?step_fraction\w+", name):
-            continue
+        is_interrupt = re.fullmatch(r"__vector_(4|6|7|11|12|13|16|18|19)|_ZN3hal\d+(set_)?step_fraction\w+", name)
+        barred, whose = (lent, "the compiler") if is_interrupt else (kept, "the interrupts")
         for line in lines:
             address, _, instruction = line.partition(":\t")
-            if kept.search(instruction.split(";", 1)[0]):
-                raise BuildError(f"{elf}: {name} {address.strip()}: {instruction!r} uses a register of the interrupts")
+            used = {int(number) for number in re.findall(r"\br(\d+)\b", instruction.split(";", 1)[0])}
+            if used & barred:
+                raise BuildError(f"{elf}: {name} {address.strip()}: {instruction!r} uses a register of {whose}")
 
 
 def build_avr(out: Path) -> Path:

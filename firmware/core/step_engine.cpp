@@ -14,28 +14,15 @@ namespace step_engine {
 
 namespace {
 
-// One run more than can be in use, so that a full ring and an empty one differ. Four joints have two: the
-// bytes of a third are the queue's, and the pace that the certificate asks for is kept
-// (tests/firmware/test_firmware_pace.py).
-constexpr uint8_t RING_RUNS = 4;
 // How far ahead of its first step a joint is started: the 16-bit timer must still tell early from late.
 constexpr int32_t START_AHEAD_TICKS = 0x7000;
 // A freeze leaves alone a step that is nearer than this.
 constexpr uint16_t FREEZE_MARGIN_TICKS = 200;
 
-struct Ring {
-    Run* oldest;              // not yet taken back
-    Run* free;                // the next to be filled
-    int32_t position_usteps;  // of all runs taken back
-    bool positive;            // direction of the run appended last
-    bool dir_inverted;
-    Run runs[RING_RUNS];  // last: see FrameReceiver
-};
-
-Ring rings[wire::JOINTS];
+constexpr uint8_t twice(uint8_t mask) { return static_cast<uint8_t>(mask << 1); }
 
 // A call takes less code than the product.
-[[gnu::noinline]] Ring& ring_of(uint8_t joint) { return rings[joint]; }
+[[gnu::noinline]] StepJoint& joint_at(uint8_t joint) { return step_joints[joint]; }
 
 // Moves a position on by steps of a run, modulo 2^32: SET_POSITION takes any.
 [[gnu::noinline]] void add_steps(int32_t& position_usteps, const Run& run, uint8_t steps) {
@@ -44,19 +31,18 @@ Ring rings[wire::JOINTS];
 }
 
 void clear(uint8_t joint) {
-    Ring& ring = ring_of(joint);
+    StepJoint& ring = joint_at(joint);
     for (uint8_t i = 0; i < RING_RUNS; ++i) {
         ring.runs[i].chained = Chain::NONE;
         ring.runs[i].next = &ring.runs[(i + 1) % RING_RUNS];
     }
     ring.oldest = ring.free = ring.runs;
-    step_joints[joint].active = ring.runs;
+    ring.active = ring.runs;
 }
 
 // Without a lock, as it is asked for between the steps of all joints: what is read twice was not written in
 // between.
-Run* active_run(uint8_t joint) {
-    const StepJoint& read = step_joints[joint];
+Run* active_run(const StepJoint& read) {
     Run* seen;
     do {
         seen = read.active;
@@ -65,8 +51,8 @@ Run* active_run(uint8_t joint) {
 }
 
 void take_back(uint8_t joint) {
-    Ring& ring = ring_of(joint);
-    const Run* const active = active_run(joint);
+    StepJoint& ring = joint_at(joint);
+    const Run* const active = active_run(ring);
     while (ring.oldest != active) {
         ring.oldest->chained = Chain::NONE;
         add_steps(ring.position_usteps, *ring.oldest, ring.oldest->steps);
@@ -74,122 +60,105 @@ void take_back(uint8_t joint) {
     }
 }
 
-// Places the first edge of an idle joint's next run. False when it is too late for it.
-template <uint8_t JOINT>
-bool start(const Run& run) {
-    const uint16_t margin = static_cast<uint16_t>(
-        (hal::dir_is<JOINT>(run.dir_high) ? hal::START_MARGIN_TICKS : DIR_MARGIN_TICKS) +
-        hal::step_early_ticks<JOINT>());
-    hal::dir_write<JOINT>(run.dir_high);
-    hal::set_steps_left<JOINT>(run.steps);
-    hal::set_step_fraction<JOINT>(run.fraction);
-    const uint16_t edge = static_cast<uint16_t>(run.first_ticks);
+// Places the first edge of an idle joint's next run, which must be `margin` ticks away. False when it is too
+// late for it.
+[[gnu::noinline]] bool start(uint8_t joint, uint8_t mask, uint16_t edge, uint16_t margin) {
     const hal::InterruptLock lock;
-    hal::step_set_edge<JOINT>(edge);
-    hal::step_forget_match<JOINT>();
-    const uint16_t nearest = static_cast<uint16_t>(hal::counter() + margin);
-    if (static_cast<int16_t>(edge - nearest) < 0) return false;
     // Its interrupt may be off because a step has just been missed, or by an emergency.
-    if (missed() || hal::emergency() != hal::Emergency::NONE) return true;
-    hal::step_arm<JOINT>();
-    hal::step_interrupt_on<JOINT>();
+    if (missed() || hal::has_emergency()) return true;
+    hal::step_set_edge(joint, edge);
+    hal::step_forget_match(joint, mask);
+    if (static_cast<int16_t>(edge - hal::counter() - margin) < 0) return false;
+    hal::step_start(joint, mask);
     return true;
 }
 
-enum class Due : uint8_t { NO, YES, TOO_LATE };
-
-// Whether an idle joint's next run must be started now. Its interrupt is off: nobody else writes `active`.
-Due is_due(uint8_t joint) {
-    const Run* const run = step_joints[joint].active;
-    if (run == ring_of(joint).free) return Due::NO;
-    const int32_t away_ticks = clock::ticks_until(run->first_ticks);
-    if (away_ticks > START_AHEAD_TICKS) return Due::NO;
-    return away_ticks > 0 ? Due::YES : Due::TOO_LATE;
-}
-
-template <uint8_t JOINT>
-bool start_when_due() {
-    if (hal::step_interrupt_is_on<JOINT>()) return true;
-    const Due due = is_due(JOINT);
-    return due == Due::NO || (due == Due::YES && start<JOINT>(*step_joints[JOINT].active));
-}
-
-// A pulse that rose without its interrupt having come: counts it and lets it fall. Interrupts are off,
-// nothing is armed.
-template <uint8_t JOINT>
-void finish_pulse() {
-    if (!hal::step_is_high<JOINT>()) return;
-    if (!hal::step_is_counted<JOINT>())
-        hal::set_steps_left<JOINT>(static_cast<uint8_t>(hal::steps_left<JOINT>() - 1));
-    hal::step_fall<JOINT>();
+// Starts a joint whose interrupt is off, so that nobody else writes `active`, when its next run is due. False
+// when it is too late for that.
+bool start_when_due(uint8_t joint, uint8_t mask) {
+    const StepJoint& at = joint_at(joint);
+    const Run& run = *at.active;
+    if (&run == at.free) return true;
+    const int32_t away_ticks = clock::ticks_until(run.first_ticks);
+    if (away_ticks > START_AHEAD_TICKS) return true;
+    if (away_ticks <= 0) return false;
+    uint16_t margin = hal::dir_set(joint, run.dir_high) ? DIR_MARGIN_TICKS : hal::START_MARGIN_TICKS;
+    margin = static_cast<uint16_t>(margin + hal::step_early_ticks(joint));
+    hal::set_steps_left(joint, run.steps);
+    if (hal::FRACTIONS_IN_REGISTERS) hal::set_step_fraction(joint, run.fraction);
+    return start(joint, mask, static_cast<uint16_t>(run.first_ticks), margin);
 }
 
 // Cuts the executed part off the active run of a joint that had its interrupt on, which is off by now: that
 // goes to the position, the rest keeps its distance to the moment, told by both clocks.
-[[gnu::noinline]] void cut_active(uint8_t joint, uint8_t were_on, uint32_t now_ticks, uint16_t counter) {
-    uint8_t mask = 0, left = 0;
-    uint16_t fraction = 0, edge = 0;
-    for_each_joint([&](auto number) {
-        constexpr uint8_t NUMBER = number.NUMBER;
-        if (joint != NUMBER) return;
-        mask = hal::step_interrupt_mask<NUMBER>();
-        left = hal::steps_left<NUMBER>();
-        fraction = hal::step_fraction<NUMBER>();
-        edge = hal::step_edge<NUMBER>();
-    });
-    if ((were_on & mask) == 0) return;
-    Run& run = *step_joints[joint].active;
-    add_steps(ring_of(joint).position_usteps, run, static_cast<uint8_t>(run.steps - left));
+[[gnu::noinline]] void cut_active(uint8_t joint, uint32_t now_ticks, uint16_t counter) {
+    StepJoint& ring = joint_at(joint);
+    Run& run = *ring.active;
+    const uint8_t left = hal::steps_left(joint);
+    add_steps(ring.position_usteps, run, static_cast<uint8_t>(run.steps - left));
     run.steps = left;
-    run.fraction = fraction;
-    run.first_ticks = now_ticks + static_cast<uint16_t>(edge - counter);
-    if (left == 0) step_joints[joint].active = run.next;
+    if (hal::FRACTIONS_IN_REGISTERS) run.fraction = hal::step_fraction(joint);
+    run.first_ticks = now_ticks + static_cast<uint16_t>(hal::step_edge(joint) - counter);
+    if (left == 0) ring.active = run.next;
 }
 
 [[gnu::noinline]] void cut_all(uint8_t were_on, uint32_t now_ticks, uint16_t counter) {
-    for (uint8_t joint = 0; joint < wire::JOINTS; ++joint) cut_active(joint, were_on, now_ticks, counter);
+    uint8_t mask = hal::FIRST_MASK;
+    for (uint8_t joint = 0; joint < wire::JOINTS; ++joint, mask = twice(mask)) {
+        if ((were_on & mask) != 0) cut_active(joint, now_ticks, counter);
+    }
 }
 
-template <uint8_t JOINT>
-bool may_freeze(uint16_t counter) {
-    if (!hal::step_interrupt_is_on<JOINT>()) return true;
-    // An edge that is past, and whose interrupt is only on its way, is no more than some hundred ticks away.
-    const int16_t ahead = static_cast<int16_t>(hal::step_edge<JOINT>() - counter);
-    return !hal::step_is_high<JOINT>() && ahead > static_cast<int16_t>(FREEZE_MARGIN_TICKS);
+// Whether no joint that is on has a pulse that is high, or a step that comes soon.
+bool may_freeze(uint8_t on, uint16_t counter) {
+    const uint8_t high = hal::step_levels_high();
+    uint8_t mask = hal::FIRST_MASK;
+    for (uint8_t joint = 0; joint < wire::JOINTS; ++joint, mask = twice(mask)) {
+        if ((on & mask) == 0) continue;
+        // An edge that is past, and whose interrupt is only on its way, is no more than some hundred ticks
+        // away.
+        const int16_t ahead = static_cast<int16_t>(hal::step_edge(joint) - counter);
+        if ((high & mask) != 0 || ahead <= static_cast<int16_t>(FREEZE_MARGIN_TICKS)) return false;
+    }
+    return true;
 }
 
-// What the interrupts change, as it was when the counter was read.
-struct Progress {
-    uint16_t counter;
-    const Run* active[wire::JOINTS];
-    uint8_t left[wire::JOINTS];
-    uint8_t levels;
-    uint8_t on;
-};
-
-bool has_active(const Progress& at) {
-    bool same = true;
-    for_each_joint(
-        [&](auto joint) { same = same && step_joints[joint.NUMBER].active == at.active[joint.NUMBER]; });
-    return same;
+bool has_seen_active() {
+    for (uint8_t joint = 0; joint < wire::JOINTS; ++joint) {
+        const StepJoint& at = joint_at(joint);
+        if (at.active != at.seen_active) return false;
+    }
+    return true;
 }
 
-// A step that comes in a lock waits for its end, so what is locked here is what changes at every step, in few
+// Looks at what the interrupts change, all as it was when the counter was read: that is returned. A step that
+// comes in a lock waits for its end, so what is locked here is what changes at every step, in few
 // instructions: 11 cycles on the Uno, with the one behind it. The active runs change with the last step of a
 // run only: when they are the same before and after, they were so in between.
-Progress progress() {
-    Progress at;
+uint16_t look(uint8_t& on) {
+    uint16_t counter;
     do {
         // Read in this order: a step that is missed in between switches off what is then told by step_missed.
-        at.on = hal::step_interrupts_on();
-        at.on = static_cast<uint8_t>(at.on | step_missed);
-        for_each_joint([&](auto joint) { at.active[joint.NUMBER] = step_joints[joint.NUMBER].active; });
-        const hal::InterruptLock lock;
-        for_each_joint([&](auto joint) { at.left[joint.NUMBER] = hal::steps_left<joint.NUMBER>(); });
-        at.counter = hal::counter();
-        at.levels = hal::step_levels();
-    } while (!has_active(at));
-    return at;
+        on = hal::step_interrupts_on();
+        on = static_cast<uint8_t>(on | step_missed);
+        for (uint8_t joint = 0; joint < wire::JOINTS; ++joint) {
+            StepJoint& at = joint_at(joint);
+            at.seen_active = at.active;
+        }
+        uint8_t left[wire::JOINTS], levels;  // in registers
+        {
+            const hal::InterruptLock lock;
+            for_each_joint([&](auto joint) { left[joint.NUMBER] = hal::steps_left(joint.NUMBER); });
+            counter = hal::counter();
+            levels = hal::step_levels();
+        }
+        for_each_joint([&](auto joint) {
+            constexpr uint8_t PIN = hal::COMPARE_PINS & hal::FIRST_MASK << joint.NUMBER;
+            if ((levels & PIN) != 0) --left[joint.NUMBER];
+            step_joints[joint.NUMBER].seen_left = left[joint.NUMBER];
+        });
+    } while (!has_seen_active());
+    return counter;
 }
 
 }  // namespace
@@ -198,14 +167,15 @@ void reset() {
     step_missed = 0;
     for (uint8_t joint = 0; joint < wire::JOINTS; ++joint) {
         clear(joint);
-        ring_of(joint).position_usteps = 0;
-        ring_of(joint).dir_inverted = false;
+        StepJoint& ring = joint_at(joint);
+        ring.position_usteps = 0;
+        ring.dir_inverted = false;
     }
 }
 
 // Executed runs are taken back only when their room is needed.
 bool has_room(uint8_t joint) {
-    const Ring& ring = ring_of(joint);
+    const StepJoint& ring = joint_at(joint);
     if (ring.free->next != ring.oldest) return true;
     take_back(joint);
     return ring.free->next != ring.oldest;
@@ -213,15 +183,16 @@ bool has_room(uint8_t joint) {
 
 bool is_idle() {
     for (uint8_t joint = 0; joint < wire::JOINTS; ++joint) {
-        if (active_run(joint) != ring_of(joint).free) return false;
+        const StepJoint& ring = joint_at(joint);
+        if (active_run(ring) != ring.free) return false;
     }
     return true;
 }
 
-Run& next_run(uint8_t joint) { return *ring_of(joint).free; }
+Run& next_run(uint8_t joint) { return *joint_at(joint).free; }
 
 void append(uint8_t joint, bool near) {
-    Ring& ring = ring_of(joint);
+    StepJoint& ring = joint_at(joint);
     Run& run = *ring.free;
     run.dir_high = run.positive != ring.dir_inverted;
     Chain chain = Chain::NONE;
@@ -234,12 +205,14 @@ void append(uint8_t joint, bool near) {
 
 bool serve() {
     if (missed()) return false;
-    bool in_time = true;
-    for_each_joint([&](auto joint) { in_time = in_time && start_when_due<joint.NUMBER>(); });
-    if (!in_time) {
+    const uint8_t on = hal::step_interrupts_on();
+    uint8_t mask = hal::FIRST_MASK;
+    for (uint8_t joint = 0; joint < wire::JOINTS; ++joint, mask = twice(mask)) {
+        if ((on & mask) != 0 || start_when_due(joint, mask)) continue;
         const hal::InterruptLock lock;
         if (step_missed == 0) step_missed = STEP_MISSED_AT_START | hal::step_interrupts_on();
         hal::steps_off();
+        return false;
     }
     return step_missed == 0;
 }
@@ -253,7 +226,12 @@ uint32_t end_steps() {
         last = hal::end_steps();
     }
     hal::wait_step_high();
-    for_each_joint([&](auto joint) { finish_pulse<joint.NUMBER>(); });
+    uint8_t levels = hal::step_levels();  // pulses that rose without their interrupt having come
+    hal::steps_fall();
+    for_each_joint([&](auto joint) {
+        constexpr uint8_t PIN = hal::COMPARE_PINS & hal::FIRST_MASK << joint.NUMBER;
+        if ((levels & PIN) != 0) hal::count_step(joint.NUMBER);
+    });
     cut_all(on, 0, 0);
     return clock::extend(last) - hal::LATE_TICKS;
 }
@@ -266,18 +244,17 @@ void drop_runs() {
     step_missed = 0;
 }
 
-// Locked for up to 80 cycles, which a step that comes meanwhile can bear: joints that may stop dead step far
-// slower than the least interval.
+// Locked for up to 59 cycles, with four joints 160, which a step that comes meanwhile can bear: joints that
+// may stop dead step far slower than the least interval. FREEZE_MARGIN_TICKS are more: no step comes before
+// the end.
 bool freeze(uint32_t& now_ticks) {
     uint8_t on;
     uint16_t counter;
     {
         const hal::InterruptLock lock;
         counter = hal::counter();
-        bool may = !missed();
-        for_each_joint([&](auto joint) { may = may && may_freeze<joint.NUMBER>(counter); });
-        if (!may) return false;
         on = hal::step_interrupts_on();
+        if (missed() || !may_freeze(on, counter)) return false;
         hal::steps_off();
     }
     now_ticks = clock::extend(counter);
@@ -287,34 +264,26 @@ bool freeze(uint32_t& now_ticks) {
 }
 
 Position position() {
-    const Progress now = progress();
     Position total;
-    total.counter = now.counter;
-    uint8_t risen[wire::JOINTS];  // of the active run
-    for_each_joint([&](auto joint) {
-        constexpr uint8_t NUMBER = joint.NUMBER;
-        const uint8_t steps = now.active[NUMBER]->steps;
-        const uint8_t high = hal::step_level<NUMBER>(now.levels) ? 1 : 0;
-        const bool is_on = (now.on & hal::step_interrupt_mask<NUMBER>()) != 0;
-        risen[NUMBER] = is_on ? static_cast<uint8_t>(steps - now.left[NUMBER] + high) : 0;
-    });
-    for (uint8_t joint = 0; joint < wire::JOINTS; ++joint) {
-        const Ring& ring = ring_of(joint);
+    uint8_t on;
+    total.counter = look(on);
+    uint8_t mask = hal::FIRST_MASK;
+    for (uint8_t joint = 0; joint < wire::JOINTS; ++joint, mask = twice(mask)) {
+        const StepJoint& at = joint_at(joint);
         int32_t& usteps = total.usteps[joint];
-        usteps = ring.position_usteps;
-        for (const Run* run = ring.oldest; run != now.active[joint]; run = run->next) {
-            add_steps(usteps, *run, run->steps);
-        }
-        add_steps(usteps, *now.active[joint], risen[joint]);
+        usteps = at.position_usteps;
+        const Run* run = at.oldest;
+        for (; run != at.seen_active; run = run->next) add_steps(usteps, *run, run->steps);
+        if ((on & mask) != 0) add_steps(usteps, *run, static_cast<uint8_t>(run->steps - at.seen_left));
     }
     return total;
 }
 
-void set_dir_inverted(uint8_t joint, bool inverted) { ring_of(joint).dir_inverted = inverted; }
+void set_dir_inverted(uint8_t joint, bool inverted) { joint_at(joint).dir_inverted = inverted; }
 
 void set_position(uint8_t joint, int32_t usteps) {
     take_back(joint);
-    ring_of(joint).position_usteps = usteps;
+    joint_at(joint).position_usteps = usteps;
 }
 
 }  // namespace step_engine

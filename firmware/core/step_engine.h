@@ -4,8 +4,8 @@
 //
 // Two sides share a ring: the main program appends runs and takes executed ones back, the step interrupt
 // works on `active` and moves on along `next`. The interrupt alone goes on to a run marked `chained`; before
-// any other it leaves the joint idle, and the main program starts it again when it is due. Steps left and
-// fraction of the active run are where the interrupt reaches them fastest: hal::steps_left, step_fraction.
+// any other it leaves the joint idle, and the main program starts it again when it is due. The steps left of
+// the active run are where the interrupt reaches them fastest: hal::steps_left. So may its fraction be.
 #pragma once
 
 #include <stdint.h>
@@ -23,7 +23,7 @@ struct Run {
     uint32_t interval_q16;  // from the current step to the next
     uint32_t add_q16;       // what the next interval has more, modulo 2^32
     uint32_t first_ticks;   // tick of the first step on the 32-bit clock
-    uint16_t fraction;      // of the first step's tick, in 2^-16
+    uint16_t fraction;      // of the current step's tick, in 2^-16
     Run* next;
     uint8_t steps;
     volatile Chain chained;  // written last
@@ -31,8 +31,20 @@ struct Run {
     bool dir_high;
 };
 
+// One run more than can be in use, so that a full ring and an empty one differ. Four joints have two: the
+// bytes of a third are the queue's, and the pace that the certificate asks for is kept
+// (tests/firmware/test_firmware_pace.py).
+constexpr uint8_t RING_RUNS = 4;
 struct StepJoint {
-    Run* volatile active;  // the run in progress, or the next one
+    Run* volatile active;     // the run in progress, or the next one
+    Run* oldest;              // not yet taken back
+    Run* free;                // the next to be filled
+    int32_t position_usteps;  // of all runs taken back
+    bool positive;            // direction of the run appended last
+    bool dir_inverted;
+    const Run* seen_active;  // when the position was read last
+    uint8_t seen_left;       // steps of it that had not risen then
+    Run runs[RING_RUNS];     // last: see FrameReceiver
 };
 
 extern StepJoint step_joints[wire::JOINTS];
@@ -97,48 +109,6 @@ Position position();
 
 // Sets the position of a joint without runs.
 void set_position(uint8_t joint, int32_t usteps);
-
-// Counts the step that has just risen and places the next one: the step interrupt in plain C++. The native
-// board runs it; hal/uno/step_interrupts.cpp does the same, statement by statement, in assembler.
-template <uint8_t JOINT>
-HAL_INLINE void on_match() {
-    Run* const run = step_joints[JOINT].active;
-    const uint8_t left = static_cast<uint8_t>(hal::steps_left<JOINT>() - 1);
-    hal::set_steps_left<JOINT>(left);
-    uint16_t edge;
-    uint16_t margin = STEP_MARGIN_TICKS + hal::step_early_ticks<JOINT>();
-    if (left != 0) {
-        const uint32_t ahead = run->interval_q16 + hal::step_fraction<JOINT>();
-        hal::set_step_fraction<JOINT>(static_cast<uint16_t>(ahead));
-        edge = static_cast<uint16_t>(hal::step_edge<JOINT>() + (ahead >> 16));
-        run->interval_q16 += run->add_q16;
-        hal::step_fall<JOINT>();
-    } else {
-        Run* const next = run->next;
-        step_joints[JOINT].active = next;
-        const Chain chained = next->chained;
-        hal::set_steps_left<JOINT>(next->steps);
-        hal::set_step_fraction<JOINT>(next->fraction);
-        edge = static_cast<uint16_t>(next->first_ticks);
-        hal::step_fall<JOINT>();
-        if (chained == Chain::NONE) {
-            hal::step_disarm<JOINT>();
-            hal::step_interrupt_off<JOINT>();
-            return;
-        }
-        if (chained == Chain::REVERSED) {
-            hal::dir_write<JOINT>(next->dir_high);
-            margin = DIR_MARGIN_TICKS + hal::step_early_ticks<JOINT>();
-        }
-    }
-    const uint16_t nearest = static_cast<uint16_t>(hal::counter() + margin);
-    if (static_cast<int16_t>(edge - nearest) >= 0) {
-        hal::step_set_edge<JOINT>(edge);
-        return;
-    }
-    step_missed = hal::step_interrupts_on();
-    hal::steps_off();
-}
 
 }  // namespace step_engine
 }  // namespace planarm

@@ -6,8 +6,10 @@ from typing import Final
 
 COMPARE_TICKS: Final = 75
 """A step that a compare output makes."""
-SECOND_MATCH_TICKS: Final = 41 + 78
-"""The same whose pulse ends by a second match: an interrupt at its rise and one at its fall."""
+RUN_COMPARE_TICKS: Final = 83
+"""The same with its fraction in the run instead of a register."""
+SECOND_MATCH_TICKS: Final = 38 + 90
+"""A step whose pulse ends by a second match: an interrupt at its rise and one at its fall."""
 PORT_TICKS: Final = 84
 """A step on another pin by the same interrupt."""
 SHARED_TICKS: Final = 210
@@ -15,7 +17,7 @@ SHARED_TICKS: Final = 210
 
 STEP_INTERRUPT_TICKS: Final[dict[str, tuple[int, ...]]] = {
     "uno": (COMPARE_TICKS,) * 2,
-    "uno_four": (COMPARE_TICKS,) * 2 + (SHARED_TICKS,) * 2,
+    "uno_four": (RUN_COMPARE_TICKS,) * 2 + (SHARED_TICKS,) * 2,
     "uno_slow": (SECOND_MATCH_TICKS,) * 2,
     "cnc_shield": (PORT_TICKS,) * 2,
     "cnc_shield_four": (PORT_TICKS,) * 2 + (SHARED_TICKS,) * 2,

@@ -23,7 +23,7 @@ from firmware_board import (
     segment_of,
 )
 from firmware_motions import fast_moves
-from firmware_tracer import SCHEDULED, Tracer
+from firmware_tracer import SCHEDULED, STEP_1, STEP_2, Tracer
 from planarm_sim.cpu import registers as reg
 from planarm_wire.codec import encode
 from planarm_wire.framing import encode_frame
@@ -66,6 +66,8 @@ MOST_OFF_TICKS = {
     "cnc_shield_four": (544, 544, 192, 192),
 }
 WATCH_STOP_INPUT, WATCH_SWITCHES = 4, 8  # bits of CONFIG's options
+# Of joints 1 and 2: every step, on in one direction, on and back, going idle.
+STEP_CYCLES = {"uno_four": (83, 75, 77, 73), "cnc_shield": (84, 84, 90, 76), "cnc_shield_four": (84, 84, 90, 76)}
 LOOK_CYCLES, ONE_STEP_CYCLES, BOTH_CYCLES = (62, 76), (127, 210), (278, 288)
 
 
@@ -322,6 +324,31 @@ def test_a_step_too_late_of_a_scheduled_joint_stops_all_joints() -> None:
     assert status.ledger.position_usteps == made
 
 
+@pytest.mark.parametrize("joint", [0, 1])
+@pytest.mark.parametrize("name", STEP_CYCLES)
+def test_cycles_of_the_step_interrupts(name: str, joint: int) -> None:
+    def segment(positive: bool) -> Segment:
+        moves = [run_of(0)] * joints
+        moves[joint] = run_of(4, positive=positive, fraction=40_000, interval=1500)
+        return segment_of(9000, *moves, joints=joints)
+
+    joints = BOARDS[name].joints
+    tracer = Tracer(RELEASE / f"{name}.hex", BOARDS[name])
+    board = Board(tracer)
+    fast = super(Tracer, tracer).run
+    tracer.run = fast  # type: ignore[method-assign]
+    board.get_ready()
+    for part in end_motion([segment(True), segment(True), segment(False)]):
+        board.ask(Segments(0, 0, 0, (part,)))
+    board.send(Start(LEAD_TICKS))
+    board.run(LEAD_TICKS - 1000)
+    del tracer.run
+    board.run(LEAD_TICKS + 30_000)
+    step, onward, reversed_, idle = STEP_CYCLES[name]
+    taken = [cycles for number, cycles in tracer.done if number == (STEP_1, STEP_2)[joint]]
+    assert taken == [*[step] * 3, onward, *[step] * 3, reversed_, *[step] * 3, idle]
+
+
 def test_cycles_of_the_scheduled_interrupt() -> None:
     def turning(positive: bool) -> Segment:
         moves = [run_of(20, first=2500, interval=2500, positive=positive)] * 2
@@ -412,13 +439,14 @@ def test_a_switch_that_closes_in_motion_tells_its_joint(name: str, joint: int) -
     )
 
 
-CLI, JUMP_TO_ITSELF, STORE_OCR1AH = b"\xf8\x94", b"\xff\xcf", b"\x89\x00"
+CLI, JUMP_TO_ITSELF = b"\xf8\x94", b"\xff\xcf"
 
 
 def place_of_start(flash: bytes) -> int:
-    """Where the main program locks interrupts to start joint 1: the CLI before the first store to OCR1A behind one."""
+    """Where the main program locks interrupts to start a joint: the CLI before an OUT to TIFR1, of any register."""
     words = [flash[at : at + 2] for at in range(0, len(flash), 2)]
-    (place, *_) = (at for at, word in enumerate(words) if word == CLI and STORE_OCR1AH in words[at : at + 10])
+    forgets = {at for at, word in enumerate(words) if int.from_bytes(word, "little") & 0xFE0F == 0xBA06}
+    (place,) = (at for at, word in enumerate(words) if word == CLI and forgets & set(range(at, at + 32)))
     return place
 
 

@@ -44,7 +44,7 @@ IMAGE = Path(__file__).parents[2] / "firmware" / "release" / "uno_slow.hex"
 UNO_SLOW = BOARDS["uno_slow"]
 HIGH, LOW, LEAST = UNO_SLOW.min_step_high_ticks, UNO_SLOW.min_step_low_ticks, UNO_SLOW.min_interval_ticks
 # firmware/hal/uno/second_match.h
-RISEN_CYCLES, STEP_CYCLES, ONWARD_CYCLES, REVERSED_CYCLES, IDLE_CYCLES = 41, 78, 68, 72, 64
+RISEN_CYCLES, STEP_CYCLES, ONWARD_CYCLES, REVERSED_CYCLES, IDLE_CYCLES = 38, 90, 63, 69, 60
 
 
 @pytest.fixture(scope="module")

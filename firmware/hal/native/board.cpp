@@ -9,8 +9,8 @@
 #include "hal_serial.h"
 #include "hal_signals.h"
 #include "hal_step_timer.h"
-#include "joints.h"
 #include "messages.h"
+#include "on_match.h"
 #include "step_engine.h"
 #include "supervisor.h"
 
@@ -31,7 +31,6 @@ struct Channel {
     bool matched;  // the flag that asks for the interrupt
     bool interrupt_on;
     uint8_t steps_left;
-    uint16_t fraction;
 };
 
 struct Board {
@@ -77,9 +76,8 @@ void match(uint8_t joint) {
     set_pin(channel.high, channel.armed && !channel.high, wire::STEP_PINS[joint]);
 }
 
-template <uint8_t JOINT>
-bool interrupt() {
-    Channel& channel = uno.channels[JOINT];
+bool interrupt(uint8_t joint) {
+    Channel& channel = uno.channels[joint];
     if (!channel.matched || !channel.interrupt_on) return false;
     channel.matched = false;
     uno.locks = 1;
@@ -87,7 +85,7 @@ bool interrupt() {
     ++uno.interrupts;
     const bool late = delays.late_every != 0 && uno.interrupts % delays.late_every == 0;
     elapse(late ? delays.late_entry : delays.entry);
-    planarm::step_engine::on_match<JOINT>();
+    planarm::step_engine::on_match(joint);
     elapse(delays.leave);
     uno.locks = 0;
     return true;
@@ -97,7 +95,7 @@ void serve_interrupts() {
     bool served;
     do {
         served = false;
-        planarm::for_each_joint([&](auto joint) { served = served || interrupt<joint.NUMBER>(); });
+        for (uint8_t joint = 0; joint < wire::JOINTS && !served; ++joint) served = interrupt(joint);
     } while (served);
 }
 
@@ -155,11 +153,9 @@ uint8_t steps_left(uint8_t joint) { return uno.channels[joint].steps_left; }
 
 void set_steps_left(uint8_t joint, uint8_t steps) { uno.channels[joint].steps_left = steps; }
 
-uint16_t fraction(uint8_t joint) { return uno.channels[joint].fraction; }
-
-void set_fraction(uint8_t joint, uint16_t fraction) { uno.channels[joint].fraction = fraction; }
-
 bool is_high(uint8_t joint) { return uno.channels[joint].high; }
+
+bool has_emergency() { return uno.emergency != Emergency::NONE; }
 
 void forget_match(uint8_t joint) { uno.channels[joint].matched = false; }
 
@@ -255,7 +251,7 @@ namespace {
 void end_pulses(hal::Emergency cause) {
     hal::steps_off();
     hal::wait_step_high();
-    planarm::for_each_joint([](auto joint) { hal::step_fall<joint.NUMBER>(); });
+    hal::steps_fall();
     uno.emergency = cause;
     uno.emergency_told = false;
 }

@@ -11,7 +11,7 @@
 // SCHEDULED  joints 2 and 3: Timer2's interrupt makes the pulse, whole, when Timer1 says so: scheduled.cpp.
 //
 // What the step interrupts of joints 0 and 1 need at every step is where IN and OUT reach it: the steps left
-// of each joint's run in GPIOR0 and GPIOR1, its fraction in registers that no compiled code uses.
+// of each joint's run in GPIOR0 and GPIOR1.
 #pragma once
 
 #include <avr/interrupt.h>
@@ -40,6 +40,11 @@ constexpr bool SECOND_MATCH = planarm::wire::MIN_STEP_HIGH_TICKS > 56;
 static_assert(!SECOND_MATCH || (output<0>() == Output::COMPARE && planarm::wire::JOINTS == 2),
               "only compare outputs end pulses by themselves");
 
+// Where every cycle of a step counts its fraction is in registers that no compiled code uses: r12 to r15,
+// which platformio.ini keeps from the compiler for those boards. A step takes 8 cycles less then, the image
+// some 700 bytes more.
+constexpr bool FRACTIONS_IN_REGISTERS = planarm::wire::JOINTS == 2 && !SECOND_MATCH;
+
 // Distance that an edge must still have when the interrupt that places it looks at the timer: the low time,
 // less 2 between the fall and the look. With a second match the low time is what the intervals leave: no more
 // than the way to the compare register.
@@ -60,10 +65,10 @@ constexpr uint8_t ONLY_LAPS = _BV(TOIE1);
 // A joint that Timer2's interrupt steps.
 struct ScheduledJoint {
     uint16_t edge;
-    uint16_t fraction;
     uint8_t left;
 };
 
+HAL_INLINE bool is_scheduled(uint8_t joint) { return planarm::wire::JOINTS > 2 && joint >= 2; }
 constexpr uint8_t SCHEDULED_JOINTS = planarm::wire::JOINTS > 2 ? planarm::wire::JOINTS - 2 : 1;
 extern ScheduledJoint scheduled[SCHEDULED_JOINTS];
 // step_interrupt_mask of those that are on.
@@ -74,10 +79,10 @@ constexpr uint16_t SCHEDULED_EARLY_TICKS = 180;
 // Lets Timer2's interrupt come and look.
 void wake_scheduled();
 
-template <uint8_t JOINT>
-HAL_INLINE ScheduledJoint& scheduled_joint() {
-    return scheduled[JOINT < 2 ? 0 : JOINT - 2];
-}
+// The last emergency's cause, as an interrupt wrote it, and whether the host knows (serial.cpp).
+extern volatile uint8_t emergency_state;
+constexpr uint8_t EMERGENCY_CAUSE = 0x03;
+HAL_INLINE bool has_emergency() { return (emergency_state & EMERGENCY_CAUSE) != 0; }
 
 // Holds interrupts off while it lives.
 class InterruptLock {
@@ -117,149 +122,87 @@ HAL_INLINE uint8_t laps() { return timer_laps; }
 HAL_INLINE bool lap_is_due() { return (TIFR1 & _BV(TOV1)) != 0; }
 
 // How much before its tick a step may rise.
-template <uint8_t JOINT>
-constexpr uint16_t step_early_ticks() {
-    return output<JOINT>() == Output::SCHEDULED ? SCHEDULED_EARLY_TICKS : 0;
+HAL_INLINE uint16_t step_early_ticks(uint8_t joint) {
+    return is_scheduled(joint) ? SCHEDULED_EARLY_TICKS : 0;
 }
 
-template <uint8_t JOINT>
-HAL_INLINE uint16_t step_edge() {
-    return output<JOINT>() == Output::SCHEDULED ? scheduled_joint<JOINT>().edge : JOINT == 0 ? OCR1A : OCR1B;
+// The tick of the next step. Interrupts must be off.
+HAL_INLINE volatile uint16_t& edge_of(uint8_t joint) {
+    static_assert(_SFR_MEM_ADDR(OCR1B) == _SFR_MEM_ADDR(OCR1A) + 2, "an array");
+    return is_scheduled(joint) ? scheduled[joint - 2].edge : (&OCR1A)[joint];
 }
+HAL_INLINE uint16_t step_edge(uint8_t joint) { return edge_of(joint); }
+HAL_INLINE void step_set_edge(uint8_t joint, uint16_t tick) { edge_of(joint) = tick; }
 
-// Sets the tick of the next match. Interrupts must be off.
-template <uint8_t JOINT>
-HAL_INLINE void step_set_edge(uint16_t tick) {
-    if (output<JOINT>() == Output::SCHEDULED) {
-        scheduled_joint<JOINT>().edge = tick;
-    } else if (JOINT == 0) {
-        OCR1A = tick;
-    } else {
-        OCR1B = tick;
-    }
-}
-
-// The pin must be low.
-template <uint8_t JOINT>
-HAL_INLINE void step_arm() {
-    if (output<JOINT>() != Output::COMPARE) return;
-    constexpr uint8_t other = JOINT == 0 ? _BV(COM1B1) | _BV(COM1B0) : _BV(COM1A1) | _BV(COM1A0);
-    TCCR1A = static_cast<uint8_t>((TCCR1A & other) | (JOINT == 0 ? _BV(COM1A0) : _BV(COM1B0)));
-}
-
-template <uint8_t JOINT>
-HAL_INLINE void step_disarm() {
-    if (output<JOINT>() != Output::COMPARE) return;
-    constexpr uint8_t other = JOINT == 0 ? _BV(COM1B1) | _BV(COM1B0) : _BV(COM1A1) | _BV(COM1A0);
-    TCCR1A = static_cast<uint8_t>((TCCR1A & other) | (JOINT == 0 ? _BV(COM1A1) : _BV(COM1B1)));
-}
-
-// Takes the pin low: on a compare output a high one when armed, any when disarmed.
-template <uint8_t JOINT>
-HAL_INLINE void step_fall() {
-    if (output<JOINT>() == Output::COMPARE) {
-        TCCR1C = JOINT == 0 ? _BV(FOC1A) : _BV(FOC1B);
-    } else {
-        write_pin(planarm::wire::STEP_PINS[JOINT], false);
-    }
+// Takes the pins of disarmed compare outputs low.
+HAL_INLINE void steps_fall() {
+    if (output<0>() == Output::COMPARE) TCCR1C = _BV(FOC1A) | _BV(FOC1B);
 }
 
 // Steps left of the active run, the current one included.
-template <uint8_t JOINT>
-HAL_INLINE uint8_t steps_left() {
-    return output<JOINT>() == Output::SCHEDULED ? scheduled_joint<JOINT>().left
-           : JOINT == 0                         ? GPIOR0
-                                                : GPIOR1;
+volatile uint8_t& left_of_four(uint8_t joint);  // a call takes less code where there are four
+HAL_INLINE volatile uint8_t& left_of(uint8_t joint) {
+    if (__builtin_constant_p(joint))
+        return joint == 0 ? GPIOR0 : joint == 1 ? GPIOR1 : scheduled[joint - 2].left;
+    return planarm::wire::JOINTS > 2 ? left_of_four(joint) : joint == 0 ? GPIOR0 : GPIOR1;
 }
-
-template <uint8_t JOINT>
-HAL_INLINE void set_steps_left(uint8_t steps) {
-    if (output<JOINT>() == Output::SCHEDULED) {
-        scheduled_joint<JOINT>().left = steps;
-    } else if (JOINT == 0) {
-        GPIOR0 = steps;
-    } else {
-        GPIOR1 = steps;
-    }
+HAL_INLINE uint8_t steps_left(uint8_t joint) { return left_of(joint); }
+HAL_INLINE void count_step(uint8_t joint) {
+    volatile uint8_t& left = left_of(joint);
+    left = static_cast<uint8_t>(left - 1);
 }
+HAL_INLINE void set_steps_left(uint8_t joint, uint8_t steps) { left_of(joint) = steps; }
 
-// Fraction of the current step's tick, in 2^-16. While the joint's interrupt is on, only it may ask. In
-// step_interrupts.cpp and scheduled.cpp.
-template <uint8_t JOINT>
-uint16_t step_fraction();
-template <uint8_t JOINT>
-void set_step_fraction(uint16_t fraction);
+// The fraction of the current step's tick, in 2^-16, where registers hold it (step_interrupts.cpp). While the
+// joint's interrupt is on, only it may ask. Elsewhere it is in the run.
+uint16_t step_fraction(uint8_t joint);
+void set_step_fraction(uint8_t joint, uint16_t fraction);
 
-// Main never sees a pulse that an interrupt makes whole.
-template <uint8_t JOINT>
-HAL_INLINE bool step_is_high() {
-    return output<JOINT>() == Output::COMPARE && read_pin(planarm::wire::STEP_PINS[JOINT]);
-}
+// Each joint has a bit, joint 0 this one and each further joint twice the one before: in TIMSK1, TIFR1 and,
+// as OC1A and OC1B, in PINB, and in what tells all joints'.
+constexpr uint8_t FIRST_MASK = _BV(OCIE1A);
+static_assert(FIRST_MASK == _BV(OCF1A) && 2 * FIRST_MASK == _BV(OCIE1B) && 2 * FIRST_MASK == _BV(OCF1B),
+              "TIFR1");
+constexpr uint8_t COMPARE_PINS = output<0>() == Output::COMPARE ? mask_of(9) | mask_of(10) : 0;
+static_assert(FIRST_MASK == mask_of(9) && 2 * FIRST_MASK == mask_of(10), "PINB");
 
-// All step pins that the compare outputs drive, in one instruction; step_level tells a joint's. With a second
-// match only those whose rise is not counted yet: OC1A and OC1B are the bits of PINB that OCF1A and OCF1B are
-// of TIFR1. The flags are read first: a pulse that falls in between is counted.
+// Of the step pins those that are high. Main never sees a pulse that an interrupt makes whole.
+HAL_INLINE uint8_t step_levels_high() { return COMPARE_PINS != 0 ? PINB & COMPARE_PINS : 0; }
+
+// The same of those whose rise is not counted yet, in an instruction or two. With a second match the flags
+// are read first: a pulse that falls in between is counted.
 HAL_INLINE uint8_t step_levels() {
     if (SECOND_MATCH) {
         const uint8_t matched = TIFR1;
         __asm__ __volatile__("nop");  // the pin is read a cycle later than it changes
         return matched & PINB;
     }
-    return ALL_DISARMED != 0 ? PINB : 0;
-}
-
-// Whether a pulse that main sees high is counted already.
-template <uint8_t JOINT>
-HAL_INLINE bool step_is_counted() {
-    return SECOND_MATCH && (TIFR1 & (JOINT == 0 ? _BV(OCF1A) : _BV(OCF1B))) == 0;
-}
-
-template <uint8_t JOINT>
-HAL_INLINE bool step_level(uint8_t levels) {
-    static_assert(output<JOINT>() != Output::COMPARE || port_of(planarm::wire::STEP_PINS[JOINT]) == Port::B,
-                  "OC1A and OC1B are on port B");
-    return output<JOINT>() == Output::COMPARE && (levels & mask_of(planarm::wire::STEP_PINS[JOINT])) != 0;
+    return COMPARE_PINS != 0 ? PINB : 0;
 }
 
 // Forgets a match that nobody waited for.
-template <uint8_t JOINT>
-HAL_INLINE void step_forget_match() {
-    if (output<JOINT>() != Output::SCHEDULED) TIFR1 = JOINT == 0 ? _BV(OCF1A) : _BV(OCF1B);
+HAL_INLINE void step_forget_match(uint8_t joint, uint8_t mask) {
+    if (!is_scheduled(joint)) TIFR1 = mask;
 }
 
-template <uint8_t JOINT>
-constexpr uint8_t step_interrupt_mask() {
-    return JOINT == 0 ? _BV(OCIE1A) : JOINT == 1 ? _BV(OCIE1B) : static_cast<uint8_t>(0x04 << JOINT);
-}
-
-template <uint8_t JOINT>
-HAL_INLINE void step_interrupt_on() {
-    if (output<JOINT>() == Output::SCHEDULED) {
-        scheduled_on = static_cast<uint8_t>(scheduled_on | step_interrupt_mask<JOINT>());
+// Lets a joint's interrupt come; its pin must be low and disarmed.
+HAL_INLINE void step_start(uint8_t joint, uint8_t mask) {
+    if (is_scheduled(joint)) {
+        scheduled_on = static_cast<uint8_t>(scheduled_on | mask);
         wake_scheduled();
-    } else {
-        TIMSK1 = static_cast<uint8_t>(TIMSK1 | step_interrupt_mask<JOINT>());
+        return;
     }
+    if (COMPARE_PINS != 0) {
+        // From 2 to 1: the match no longer takes the pin low, but toggles it.
+        constexpr uint8_t first = _BV(COM1A1) | _BV(COM1A0), second = _BV(COM1B1) | _BV(COM1B0);
+        TCCR1A = static_cast<uint8_t>(TCCR1A ^ (joint == 0 ? first : second));
+    }
+    TIMSK1 = static_cast<uint8_t>(TIMSK1 | mask);
 }
 
-template <uint8_t JOINT>
-HAL_INLINE void step_interrupt_off() {
-    if (output<JOINT>() == Output::SCHEDULED) {
-        scheduled_on = static_cast<uint8_t>(scheduled_on & ~step_interrupt_mask<JOINT>());
-    } else {
-        TIMSK1 = static_cast<uint8_t>(TIMSK1 & ~step_interrupt_mask<JOINT>());
-    }
-}
-
-// The masks of the interrupts that are on.
+// The bits of the joints whose interrupts are on, and others.
 HAL_INLINE uint8_t step_interrupts_on() {
     return planarm::wire::JOINTS > 2 ? static_cast<uint8_t>(TIMSK1 | scheduled_on) : TIMSK1;
-}
-
-template <uint8_t JOINT>
-HAL_INLINE bool step_interrupt_is_on() {
-    const uint8_t on = output<JOINT>() == Output::SCHEDULED ? scheduled_on : TIMSK1;
-    return (on & step_interrupt_mask<JOINT>()) != 0;
 }
 
 HAL_INLINE void step_interrupts_off() {
@@ -300,15 +243,7 @@ inline void wait_step_high() {
     __asm__ __volatile__("1: dec %0\n\tbrne 1b" : "+r"(turns));
 }
 
-template <uint8_t JOINT>
-HAL_INLINE bool dir_is(bool positive) {
-    return written_pin(planarm::wire::DIR_PINS[JOINT]) == positive;
-}
-
-// One instruction, so no lock is needed.
-template <uint8_t JOINT>
-HAL_INLINE void dir_write(bool positive) {
-    write_pin(planarm::wire::DIR_PINS[JOINT], positive);
-}
+// Sets a joint's DIR; true when it changed.
+bool dir_set(uint8_t joint, bool high);
 
 }  // namespace hal

@@ -35,9 +35,6 @@ volatile uint8_t overruns;  // bytes lost in the USART
 
 volatile uint8_t holds;
 
-// The last emergency's cause, as an interrupt wrote it, and whether the host knows.
-volatile uint8_t emergency_state;
-constexpr uint8_t CAUSE = 0x03;
 constexpr uint8_t TOLD = 0x04;
 
 // Timer 0 counts from here to its overflow once an emergency has disarmed the joints. A pulse that rose just
@@ -51,6 +48,7 @@ volatile uint8_t sending_at;  // 256 less the bytes left to be sent, 0 at the en
 }  // namespace
 
 uint8_t reply[MAX_REPLY_BYTES];
+volatile uint8_t emergency_state;
 
 void serial_init() {
     TCCR0B = 0;
@@ -95,7 +93,7 @@ uint8_t serial_ring_full() { return ring_full; }
 
 uint8_t hold_count() { return holds; }
 
-Emergency emergency() { return static_cast<Emergency>(emergency_state & CAUSE); }
+Emergency emergency() { return static_cast<Emergency>(emergency_state & EMERGENCY_CAUSE); }
 
 void emergency_told() {
     const InterruptLock lock;

@@ -1,11 +1,12 @@
-// The step interrupts in assembler: step_engine::on_match of core/step_engine.h, statement by statement.
+// The step interrupts in assembler: on_match of core/on_match.h, statement by statement.
 //
-// No compiled or library code uses r2 to r15: platformio.ini keeps the compiler off them, build.py checks the
+// No compiled or library code uses r2 to r11: platformio.ini keeps the compiler off them, build.py checks the
 // linked program. The interrupts, which never nest, need no stack. Here they hold
-//   r2         the status register         r8 to r11  interval; at a turn DIR's port
-//   r4, r5     the interrupted code's Z    r12, r13   fraction of joint 1
-//   r6, r7     the next edge               r14, r15   fraction of joint 2
+//   r2         the status register         r6, r7     the next edge
+//   r4, r5     the interrupted code's Z    r8 to r11  interval; at a turn DIR's port
 //   r3         a byte on its way
+// and, where every cycle counts (hal::FRACTIONS_IN_REGISTERS), the fractions in r12 to r15, which are kept
+// from the compiler there, too; other boards have them in the runs.
 //
 // Cycles from the match, if nothing else runs, with entry (4) and the jump from the vector (3):
 //                            all    pin falls   look at the timer   next edge placed
@@ -14,6 +15,7 @@
 //   on and back               77       56              59                71
 //   going idle                73       56
 //   a step missed             82, of joint 2 84
+// With the fraction in the run one step after another takes 83, and the pin falls after 64.
 // tests/firmware/test_firmware_cycles.py counts them. The least interval of one joint covers what may run
 // when its step rises: what is left of a receive interrupt without room (39), a lock of the main program
 // (11), the other joint's interrupt (in a turn 77), the one instruction that comes between two interrupts
@@ -53,8 +55,11 @@ static_assert(hal::output<0>() != hal::Output::COMPARE ||
                    port_of(wire::DIR_PINS[1]) != port_of(wire::STEP_PINS[1])),
               "no step pin that changes in between");
 
-// The first of the joint's two registers for the fraction; the assembler takes registers by number.
-constexpr uint8_t fraction_register(uint8_t joint) { return joint == 0 ? 12 : 14; }
+// The first of the joint's two registers for the fraction, 0 where that is in the run; the assembler takes
+// registers by number.
+constexpr uint8_t fraction_register(uint8_t joint) {
+    return static_cast<uint8_t>(!hal::FRACTIONS_IN_REGISTERS ? 0 : joint == 0 ? 12 : 14);
+}
 
 }  // namespace
 
@@ -82,10 +87,20 @@ HAL_INLINE void step_interrupt() {
         ldd  r9, Z + %[interval] + 1
         ldd  r10, Z + %[interval] + 2
         ldd  r11, Z + %[interval] + 3
+        .if %[part] == 0
+        ldd  r3, Z + %[fraction]        ; fraction += interval
+        add  r3, r8
+        std  Z + %[fraction], r3
+        ldd  r3, Z + %[fraction] + 1
+        adc  r3, r9
+        std  Z + %[fraction] + 1, r3
+        .endif
         lds  r6, %[ocr]                 ; the next edge
         lds  r7, %[ocr] + 1
+        .if %[part]
         add  %[part], r8
         adc  %[part] + 1, r9
+        .endif
         adc  r6, r10
         adc  r7, r11
         ldd  r3, Z + %[add]             ; interval += add
@@ -102,10 +117,12 @@ HAL_INLINE void step_interrupt() {
         std  Z + %[interval] + 3, r11
     8:
         .if %[by_match]
+        .if %[part]
         rjmp .+0                        ; the pulse rose 9 cycles after the match
         rjmp .+0
         rjmp .+0
         rjmp .+0
+        .endif
         cbi  %[step_port], %[step_bit]  ; fall
         .else
         ldi  r30, %[foc]                ; fall
@@ -130,8 +147,10 @@ HAL_INLINE void step_interrupt() {
         movw r30, r6
         ldd  r3, Z + %[steps]
         out  %[left], r3
+        .if %[part]
         ldd  %[part], Z + %[fraction]
         ldd  %[part] + 1, Z + %[fraction] + 1
+        .endif
         ldd  r6, Z + %[first]
         ldd  r7, Z + %[first] + 1
         ldd  r3, Z + %[chained]
@@ -139,8 +158,19 @@ HAL_INLINE void step_interrupt() {
         in   r9, %[dir_port]
         bst  r8, 0
         bld  r9, %[dir_bit]
+        .if %[part]
         rjmp .+0                        ; the pulse is as long as any other
         nop
+        .elseif %[by_match]
+        ldi  r30, 5                     ; the pulse is as long as it must be
+    7:  dec  r30
+        brne 7b
+        .else
+        nop
+        ldi  r30, 2
+    7:  dec  r30
+        brne 7b
+        .endif
         tst  r3
         breq 4f
         sbrs r3, 1
@@ -148,10 +178,12 @@ HAL_INLINE void step_interrupt() {
 
         nop                             ; turn round
         .if %[by_match]
+        .if %[part]
         rjmp .+0
         rjmp .+0
         rjmp .+0
         rjmp .+0
+        .endif
         cbi  %[step_port], %[step_bit]
         sbrc r8, 0
         sbi  %[dir_port], %[dir_bit]
@@ -197,10 +229,12 @@ HAL_INLINE void step_interrupt() {
 
     4:  rjmp .+0                        ; go idle
         .if %[by_match]
+        .if %[part]
         rjmp .+0
         rjmp .+0
         rjmp .+0
         rjmp .+0
+        .endif
         cbi  %[step_port], %[step_bit]
         .else
         ldi  r30, %[foc]
@@ -239,28 +273,22 @@ HAL_INLINE void step_interrupt() {
 
 namespace hal {
 
-template <>
-uint16_t step_fraction<0>() {
+uint16_t step_fraction(uint8_t joint) {
     uint16_t fraction;
-    __asm__ __volatile__("movw %0, r12" : "=r"(fraction));
+    if (joint == 0) {
+        __asm__ __volatile__("movw %0, r12" : "=r"(fraction));
+    } else {
+        __asm__ __volatile__("movw %0, r14" : "=r"(fraction));
+    }
     return fraction;
 }
 
-template <>
-uint16_t step_fraction<1>() {
-    uint16_t fraction;
-    __asm__ __volatile__("movw %0, r14" : "=r"(fraction));
-    return fraction;
-}
-
-template <>
-void set_step_fraction<0>(uint16_t fraction) {
-    __asm__ __volatile__("movw r12, %0" ::"r"(fraction));
-}
-
-template <>
-void set_step_fraction<1>(uint16_t fraction) {
-    __asm__ __volatile__("movw r14, %0" ::"r"(fraction));
+void set_step_fraction(uint8_t joint, uint16_t fraction) {
+    if (joint == 0) {
+        __asm__ __volatile__("movw r12, %0" ::"r"(fraction));
+    } else {
+        __asm__ __volatile__("movw r14, %0" ::"r"(fraction));
+    }
 }
 
 volatile uint8_t timer_laps;

@@ -2,12 +2,12 @@
 //
 // Timer2 counts at a 32nd of the clock and only wakes; Timer1 tells the time. A joint whose step is due, or
 // nearly so, is raised at once, both joints in the same few cycles; only then each step is counted, its pulse
-// taken low and its next edge computed, as step_engine::on_match of core/step_engine.h does it, statement by
+// taken low and its next edge computed, as on_match of core/on_match.h does it, statement by
 // statement. So neither waits for the other's computation: a step rises at most SCHEDULED_EARLY_TICKS early,
 // or as late as Timer2's grain and another interrupt hold this one up.
 //
 // Like the interrupts of joints 0 and 1 (step_interrupts.cpp) it needs no stack and uses the registers that
-// no compiled code uses, but for the fractions in r12 to r15. Cycles with entry and jump, counted by
+// no compiled code uses. Cycles with entry and jump, counted by
 // tests/firmware/test_firmware_boards.py: a look 62 to 76, one joint's step 127 to 210 with the looks before
 // and after it, both joints' 278 to 288.
 
@@ -23,32 +23,16 @@ namespace hal {
 ScheduledJoint scheduled[SCHEDULED_JOINTS];
 volatile uint8_t scheduled_on;
 
+volatile uint8_t& left_of_four(uint8_t joint) {
+    return joint == 0 ? GPIOR0 : joint == 1 ? GPIOR1 : scheduled[joint - 2].left;
+}
+
 void wake_scheduled() {
     // A wake-up of the other joint that is nearer stays, and one that is due is not forgotten: each look sets
     // the next.
     const bool is_nearer = (TIMSK2 & _BV(OCIE2A)) != 0 && static_cast<uint8_t>(OCR2A - TCNT2) <= 2;
     if (!is_nearer) OCR2A = static_cast<uint8_t>(TCNT2 + 2);
     TIMSK2 = _BV(OCIE2A);
-}
-
-template <>
-uint16_t step_fraction<2>() {
-    return scheduled[0].fraction;
-}
-
-template <>
-uint16_t step_fraction<3>() {
-    return scheduled[1].fraction;
-}
-
-template <>
-void set_step_fraction<2>(uint16_t fraction) {
-    scheduled[0].fraction = fraction;
-}
-
-template <>
-void set_step_fraction<3>(uint16_t fraction) {
-    scheduled[1].fraction = fraction;
 }
 
 }  // namespace hal
@@ -74,12 +58,12 @@ constexpr uint16_t FARTHEST_TICKS = 240 * 32 - SCHEDULED_EARLY_TICKS;
 
 constexpr uint8_t port_of(uint8_t pin) { return static_cast<uint8_t>(hal::port_of(pin)); }
 
-static_assert(offsetof(ScheduledJoint, edge) == 0 && offsetof(ScheduledJoint, fraction) == 2 &&
-                  offsetof(ScheduledJoint, left) == 4 && sizeof(ScheduledJoint) == 5,
+static_assert(offsetof(ScheduledJoint, edge) == 0 && offsetof(ScheduledJoint, left) == 2 &&
+                  sizeof(ScheduledJoint) == 3 && sizeof(planarm::StepJoint) == 95,
               "the macros' offsets");
 static_assert(static_cast<uint8_t>(Chain::NONE) == 0 && static_cast<uint8_t>(Chain::REVERSED) == 2,
               "likewise");
-static_assert(hal::step_interrupt_mask<2>() == 0x10 && hal::step_interrupt_mask<3>() == 0x20, "bits of r3");
+static_assert(hal::FIRST_MASK << 2 == 0x08, "bits of r3");
 static_assert(hal::ONLY_LAPS == 1, "what a missed step leaves on");
 static_assert(_SFR_MEM_ADDR(TIMSK2) == _SFR_MEM_ADDR(TIMSK1) + 1, "%[timsk] + 1");
 static_assert(_SFR_MEM_ADDR(TCNT2) == _SFR_MEM_ADDR(TCCR1A) + 0x32, "%[tccra] + 0x32");
@@ -93,10 +77,10 @@ ISR(TIMER2_COMPA_vect, ISR_NAKED) {
         R"(
         ; look JOINT, PORT, BIT: raises the pin and notes it in r10 when the step is due, else finds the nearest
         .macro look joint port bit
-        sbrs r3, 4 + \joint
+        sbrs r3, 3 + \joint
         rjmp 1f
-        lds  r24, %[joints] + 5 * \joint
-        lds  r25, %[joints] + 5 * \joint + 1
+        lds  r24, %[joints] + 3 * \joint
+        lds  r25, %[joints] + 3 * \joint + 1
         sub  r24, r8
         sbc  r25, r9
         subi r24, lo8(%[early])
@@ -121,32 +105,32 @@ ISR(TIMER2_COMPA_vect, ISR_NAKED) {
         .macro finish joint port bit            ; a pulse that has risen and is not counted yet
         sbis \port - 2, \bit
         rjmp 1f
-        lds  r24, %[joints] + 5 * \joint + 4
+        lds  r24, %[joints] + 3 * \joint + 2
         dec  r24
-        sts  %[joints] + 5 * \joint + 4, r24
+        sts  %[joints] + 3 * \joint + 2, r24
         cbi  \port, \bit
     1:
         .endm
 
         .macro step joint port bit dir_port dir_bit
-        lds  r30, %[active] + 2 * \joint
-        lds  r31, %[active] + 2 * \joint + 1
-        lds  r24, %[joints] + 5 * \joint + 4
+        lds  r30, %[active] + 95 * \joint
+        lds  r31, %[active] + 95 * \joint + 1
+        lds  r24, %[joints] + 3 * \joint + 2
         dec  r24
-        sts  %[joints] + 5 * \joint + 4, r24
+        sts  %[joints] + 3 * \joint + 2, r24
         breq 1f
         ldd  r8, Z + %[interval]
         ldd  r9, Z + %[interval] + 1
         ldd  r10, Z + %[interval] + 2
         ldd  r11, Z + %[interval] + 3
-        lds  r24, %[joints] + 5 * \joint       ; the next edge
-        lds  r25, %[joints] + 5 * \joint + 1
-        lds  r3, %[joints] + 5 * \joint + 2
+        lds  r24, %[joints] + 3 * \joint       ; the next edge
+        lds  r25, %[joints] + 3 * \joint + 1
+        ldd  r3, Z + %[fraction]
         add  r3, r8
-        sts  %[joints] + 5 * \joint + 2, r3
-        lds  r3, %[joints] + 5 * \joint + 3
+        std  Z + %[fraction], r3
+        ldd  r3, Z + %[fraction] + 1
         adc  r3, r9
-        sts  %[joints] + 5 * \joint + 3, r3
+        std  Z + %[fraction] + 1, r3
         adc  r24, r10
         adc  r25, r11
         ldd  r3, Z + %[add]                    ; interval += add
@@ -168,15 +152,15 @@ ISR(TIMER2_COMPA_vect, ISR_NAKED) {
 
     1:  ldd  r24, Z + %[next]                  ; the run is done
         ldd  r25, Z + %[next] + 1
-        sts  %[active] + 2 * \joint, r24
-        sts  %[active] + 2 * \joint + 1, r25
+        sts  %[active] + 95 * \joint, r24
+        sts  %[active] + 95 * \joint + 1, r25
         movw r30, r24
         ldd  r24, Z + %[steps]
-        sts  %[joints] + 5 * \joint + 4, r24
-        ldd  r24, Z + %[fraction]
-        sts  %[joints] + 5 * \joint + 2, r24
-        ldd  r24, Z + %[fraction] + 1
-        sts  %[joints] + 5 * \joint + 3, r24
+        sts  %[joints] + 3 * \joint + 2, r24
+        rjmp .+0
+        rjmp .+0
+        rjmp .+0
+        rjmp .+0
         ldd  r24, Z + %[first]
         ldd  r25, Z + %[first] + 1
         ldd  r3, Z + %[chained]
@@ -187,7 +171,7 @@ ISR(TIMER2_COMPA_vect, ISR_NAKED) {
         tst  r3
         brne 2f
         lds  r24, %[on]                        ; go idle
-        andi r24, 0xFF - (0x10 << \joint)
+        andi r24, 0xFF - (0x08 << \joint)
         sts  %[on], r24
         rjmp 4f
     2:  ldd  r9, Z + %[dir_high]
@@ -201,8 +185,8 @@ ISR(TIMER2_COMPA_vect, ISR_NAKED) {
         cbi  \dir_port, \dir_bit
         ldi  r30, lo8(%[dir_margin])
         ldi  r31, hi8(%[dir_margin])
-    3:  sts  %[joints] + 5 * \joint, r24
-        sts  %[joints] + 5 * \joint + 1, r25
+    3:  sts  %[joints] + 3 * \joint, r24
+        sts  %[joints] + 3 * \joint + 1, r25
         lds  r8, %[tccra] + 4                  ; late?
         lds  r9, %[tccra] + 5
         sub  r24, r8
