@@ -24,7 +24,7 @@ SWITCHES = (
     LimitSwitchSpec(1, "A1", np.radians(61.0), True, 0.001),
     LimitSwitchSpec(2, "A2", np.radians(-65.0), False, 0.001),
 )
-MOTION_S = 5.0
+MOTION_S = 3.0
 """When the motion begins that a fault is meant for; homing has long ended."""
 
 

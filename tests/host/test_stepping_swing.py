@@ -1,5 +1,6 @@
 """Swings of rotors and links: closed forms, a plain integration of the whole arm, and what the certificate says."""
 
+from bisect import bisect_right
 from dataclasses import replace
 from math import pi, sqrt
 
@@ -89,29 +90,31 @@ def plain_lags(scene, train, until_s):
         for start, steps in zip(train.start_usteps, train.steps, strict=True)
     ]
     to_field = np.array([0.5 * pi / joint.microsteps for joint in joints])
+    ticks = [steps.ticks.tolist() for steps in train.steps]
+    viscous, coulomb = np.array(mechanics.viscous_friction_nm_s), np.array(mechanics.coulomb_friction_nm)
+    still, beside = np.zeros(n), 4.0 * rotors.teeth
+    peak = rotors.constant_nm_a * rotors.current_a
 
     def fields(t):
-        passed = [np.searchsorted(steps.ticks, t * 16e6, side="right") for steps in train.steps]
-        return to_field * np.array([at[k] for at, k in zip(positions, passed, strict=True)])
+        return to_field * [at[bisect_right(of, t * 16e6)] for at, of in zip(positions, ticks, strict=True)]
 
     def slopes(t, y):
         q, qd, rotor, speed = y.reshape(4, n)
         slack = coupling @ (q - zero) - rotor / rotors.gear
         beyond = np.sign(slack) * np.maximum(np.abs(slack) - rotors.half_play_rad, 0.0)
         geared = -rotors.stiffness_nm_rad * beyond
-        geared -= np.where(beyond != 0.0, rotors.gear_damping_nm_s * (coupling @ qd - speed / rotors.gear), 0.0)
-        friction = np.array(mechanics.viscous_friction_nm_s) * qd
-        friction += np.array(mechanics.coulomb_friction_nm) * np.tanh(qd / 0.002)
-        push = coupling.T @ geared - friction - inverse_dynamics(body, q, qd, np.zeros(n))
-        lag = fields(t) - rotors.teeth * rotor
-        pull = rotors.constant_nm_a * rotors.current_a * np.sin(lag)
-        pull -= rotors.detent_nm * np.sin(4.0 * rotors.teeth * rotor) + rotors.damping_nm_s * speed
+        geared -= (beyond != 0.0) * rotors.gear_damping_nm_s * (coupling @ qd - speed / rotors.gear)
+        friction = viscous * qd + coulomb * np.tanh(qd / 0.002)
+        push = coupling.T @ geared - friction - inverse_dynamics(body, q, qd, still)
+        pull = peak * np.sin(fields(t) - rotors.teeth * rotor)
+        pull -= rotors.detent_nm * np.sin(beside * rotor) + rotors.damping_nm_s * speed
         spin = (pull - geared / rotors.gear) / rotors.inertia_kg_m2
         return np.concatenate([qd, np.linalg.solve(inertia_matrix(body, q), push), speed, spin])
 
     rotor = fields(0.0) / rotors.teeth
     y = np.concatenate([zero + np.linalg.solve(coupling, rotor / rotors.gear), np.zeros(n), rotor, np.zeros(n)])
-    found = solve_ivp(slopes, (0.0, until_s), y, "RK45", rtol=1e-5, atol=1e-8, max_step=2e-4)
+    # With a tenth of these errors the lags differ by at most 0.011.
+    found = solve_ivp(slopes, (0.0, until_s), y, "RK45", rtol=1e-4, atol=1e-7, max_step=2e-4)
     lags = [np.abs(fields(t) - rotors.teeth * y[2 * n : 3 * n]) for t, y in zip(found.t, found.y.T, strict=True)]
     return np.max(lags, axis=0)
 

@@ -71,11 +71,12 @@ def distances(a, b, c):
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_the_elbow_stays_on_the_arc_between_its_known_places(seed):
-    """3,000 ways for each seed: its angle, its distance from the hull of the places, and how far any point moves."""
+def test_the_elbow_stays_on_the_arc_between_its_known_places(seed, sized):
+    """1,200 ways for each seed, 3,000 with --full: angle, distance from the places' hull, how far any point moves."""
     rng = np.random.default_rng(seed)
     seen = {"known": 0, "turned": 0, "overshoots": 0, "tight": 0.0}
-    for _ in range(3000):
+    tried = sized(1200, 3000)
+    for _ in range(tried):
         scene, a, b = random_way(rng)
         _, known, sweep, elbow, tips = swept(scene, a, b)
         if not known:
@@ -96,7 +97,7 @@ def test_the_elbow_stays_on_the_arc_between_its_known_places(seed):
         ends = angles[:2]
         seen["overshoots"] += bool(theta.max() > ends.max() + 1e-6 or theta.min() < ends.min() - 1e-6)
         seen["tight"] = max(seen["tight"], moved / sweep.moves_cm)
-    assert seen["known"] > 2000 and seen["turned"] > 100 and seen["overshoots"] > 50
+    assert seen["known"] > tried // 1.5 and seen["turned"] > tried // 30 and seen["overshoots"] > tried // 60
     assert seen["tight"] > 0.999
 
 

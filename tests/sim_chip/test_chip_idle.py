@@ -6,7 +6,7 @@ in the same state, with the same edges at the same cycles.
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as some
 
 from planarm_sim.cpu import layout as at
@@ -96,6 +96,7 @@ def run(image: bytes, cycles: int, slice_cycles: int) -> tuple:
 
 
 @pytest.mark.parametrize("loop", LOOPS.values(), ids=LOOPS.keys())
+@settings(max_examples=40)
 @given(top=some.integers(60, 3000), cycles=some.integers(5_000, 20_000))
 def test_same_outcome_as_in_slices_too_short_to_pass_over_anything(loop, top, cycles):
     image = program(loop, top)
