@@ -16,8 +16,8 @@ namespace {
 
 // How far ahead of its first step a joint is started: the 16-bit timer must still tell early from late.
 constexpr int32_t START_AHEAD_TICKS = 0x7000;
-// A freeze leaves alone a step that is nearer than this.
-constexpr uint16_t FREEZE_MARGIN_TICKS = 200;
+// A freeze leaves alone a step that is nearer than this: more than its lock takes, in which no step may come.
+constexpr uint16_t FREEZE_MARGIN_TICKS = 100 * wire::JOINTS;
 
 constexpr uint8_t twice(uint8_t mask) { return static_cast<uint8_t>(mask << 1); }
 
@@ -244,9 +244,8 @@ void drop_runs() {
     step_missed = 0;
 }
 
-// Locked for up to 59 cycles, with four joints 160, which a step that comes meanwhile can bear: joints that
-// may stop dead step far slower than the least interval. FREEZE_MARGIN_TICKS are more: no step comes before
-// the end.
+// Locked for 47 to 62 cycles, with four joints up to 202, which a step that comes meanwhile can bear: joints
+// that may stop dead step far slower than the least interval.
 bool freeze(uint32_t& now_ticks) {
     uint8_t on;
     uint16_t counter;

@@ -439,6 +439,36 @@ def test_a_switch_that_closes_in_motion_tells_its_joint(name: str, joint: int) -
     )
 
 
+@pytest.mark.parametrize("name", sorted(BOARDS))
+def test_the_lock_of_a_freeze_ends_before_the_steps_that_it_does_not_leave_alone(name: str) -> None:
+    # firmware/core/step_engine.cpp: FREEZE_MARGIN_TICKS. The last passes before they rest run by single instructions.
+    joints = BOARDS[name].joints
+    tracer = Tracer(RELEASE / f"{name}.hex", BOARDS[name])
+    board = Board(tracer)
+    single_run, tracer.run = tracer.run, super(Tracer, tracer).run  # type: ignore[method-assign]
+    board.get_ready()
+    moves = [run_of(30, first=100 + 300 * joint, interval=10_000) for joint in range(joints)]
+    for segment in end_motion([segment_of(300_000, *moves, joints=joints)] * 5):
+        board.ask(Segments(200, 200, 1, (segment,)))
+    board.ask(Start(LEAD_TICKS))
+    board.run(LEAD_TICKS + 100_000)
+    board.receive(bytes([HOLD_CODE]))
+    seen = [tracer.uno.snapshot()]
+    while board.ask_now().state is not State.HELD:
+        seen.append(tracer.uno.snapshot())
+        board.run(20_000)
+    tracer.uno.restore(seen[-2])  # the reply before may tell of what was before the freeze
+    tracer.run = single_run  # type: ignore[method-assign]
+    chip = tracer.chip
+    longest, end = 0, chip.cycle + 120_000
+    while chip.cycle < end:
+        begin = chip.cycle
+        tracer.run_until(lambda: bool(chip.sreg & 0x80))
+        longest = max(longest, chip.cycle - begin)
+        tracer.run_until(lambda: not chip.sreg & 0x80)
+    assert 30 <= longest < 100 * joints
+
+
 CLI, JUMP_TO_ITSELF = b"\xf8\x94", b"\xff\xcf"
 
 
