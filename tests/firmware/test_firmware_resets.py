@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from firmware_board import LEAD_TICKS, WAKE_TICKS, Board, EmulatedFirmware, run_of, segment_of
+from firmware_board import LEAD_TICKS, WAKE_TICKS, Board, EmulatedFirmware, end_motion, run_of, segment_of
 from planarm_sim.cpu import layout as at
 from planarm_sim.cpu import registers as reg
 from planarm_sim.cpu.values import ResetCause
@@ -104,40 +104,76 @@ def test_why_the_chip_started_behind_the_stock_boot_loader(
     assert (welcome.reset_cause, welcome.interrupted) == (told, 1)
 
 
-def test_the_watchdogs_reset_is_told_behind_the_stock_boot_loader(behind_optiboot: EmulatedFirmware) -> None:
+def stand_still(firmware: EmulatedFirmware, *, interrupts: bool) -> None:
+    """Let the main program do nothing any more, with interrupts on or off."""
+    chip, code = firmware.uno._chip, firmware.uno.flash
+    chip.pc = next(word for word in range(len(code) // 2) if code[2 * word : 2 * word + 2] == JUMP_TO_ITSELF)
+    if not interrupts:
+        chip.sreg &= 0x7F
+
+
+INTERRUPTS = pytest.mark.parametrize("interrupts", [True, False], ids=["interrupts on", "interrupts off"])
+
+
+@INTERRUPTS
+def test_the_watchdogs_reset_is_told_behind_the_stock_boot_loader(
+    behind_optiboot: EmulatedFirmware, interrupts: bool
+) -> None:
+    # With interrupts off the one that leaves a mark in memory cannot come, and the boot loader clears MCUSR.
     board = Board(behind_optiboot)
     board.get_ready()
-    uno, code = behind_optiboot.uno, behind_optiboot.uno.flash
-    uno._chip.pc = next(word for word in range(len(code) // 2) if code[2 * word : 2 * word + 2] == JUMP_TO_ITSELF)
+    stand_still(behind_optiboot, interrupts=interrupts)
     board.run(3 * WATCHDOG_MS * TICKS_HZ // 1000)
     board.forget_replies()
     welcome = board.hello()
-    assert (welcome.reset_cause, welcome.interrupted) == (Reset.WATCHDOG, 1)
+    assert (welcome.reset_cause, welcome.interrupted) == (Reset.WATCHDOG if interrupts else Reset.UNKNOWN, 1)
 
 
+def run_to_release(firmware: EmulatedFirmware) -> None:
+    """Run to the very cycle in which the drivers are released, within a second."""
+    uno = firmware.uno
+    begin = uno.cycle
+    while True:
+        before = uno.snapshot()
+        uno.clear_edges()
+        uno.run(cycles=20_000)
+        released = [int(cycle) for cycle, level in uno.edges(ENABLE_PIN) if level]
+        if released:
+            uno.restore(before)
+            uno.run(cycles=released[0] - uno.cycle)
+            return
+        assert uno.cycle - begin < TICKS_HZ, "no watchdog"
+
+
+@INTERRUPTS
 @pytest.mark.parametrize("hidden", [False, True], ids=["MCUSR as it is", "MCUSR cleared"])
-def test_a_main_program_that_stands_still_is_reset(emulated_firmware: EmulatedFirmware, hidden: bool) -> None:
+def test_a_main_program_that_stands_still_is_reset(
+    emulated_firmware: EmulatedFirmware, hidden: bool, interrupts: bool
+) -> None:
+    # In the middle of a motion; the ledger begins anew, and the mark in EEPROM tells that the drivers were enabled.
     board = Board(emulated_firmware)
     board.get_ready()
-    uno, chip = emulated_firmware.uno, emulated_firmware.uno._chip
-    code = uno.flash
-    chip.pc = next(word for word in range(len(code) // 2) if code[2 * word : 2 * word + 2] == JUMP_TO_ITSELF)
-    stood_from = uno.cycle
-    released: list[int] = []
-    uno.clear_edges()
-    while not released:
-        uno.run(cycles=20_000)
-        released = [int(cycle) for cycle, level in uno.edges("D8") if level]
-        assert uno.cycle - stood_from < TICKS_HZ, "no watchdog"
+    for segment in end_motion([segment_of(96_000, run_of(299, first=0, interval=320))] * 20):
+        board.ask(Segments(0, 0, 0, (segment,)))
+    board.send(Start(LEAD_TICKS))
+    board.run(300_000)
+    assert board.ask_now().ledger.position_usteps[0] > 0
+    chip = emulated_firmware.uno._chip
+    stand_still(emulated_firmware, interrupts=interrupts)
+    stood_from = board.now
+    run_to_release(emulated_firmware)
     # The watchdog's oscillator may be 10 % off; the main program had fed it less than a pass before.
-    assert (released[0] - stood_from) / TICKS_HZ == pytest.approx(2 * WATCHDOG_MS / 1000, rel=0.15)
+    assert (board.now - stood_from) / TICKS_HZ == pytest.approx(2 * WATCHDOG_MS / 1000, rel=0.15)
+    assert chip._state[reg.MCUSR] == ResetCause.WATCHDOG
     if hidden:
         chip._state[reg.MCUSR] = 0
     board.run(BOOT_CYCLES)
-    board.replies.clear()
+    board.forget_replies()
     welcome = board.hello()
-    assert (welcome.reset_cause, welcome.interrupted) == (Reset.WATCHDOG, 1)
-    assert board.ask().state is State.IDLE
+    told = Reset.WATCHDOG if interrupts or not hidden else Reset.UNKNOWN
+    assert (welcome.reset_cause, welcome.interrupted) == (told, 1)
+    status = board.ask()
+    assert (status.state, status.ledger.position_usteps, status.ledger.executed_segments) == (State.IDLE, (0, 0), 0)
 
 
 def test_a_watchdog_reset_is_told_once(emulated_firmware: EmulatedFirmware) -> None:

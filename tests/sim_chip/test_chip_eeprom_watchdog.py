@@ -127,6 +127,24 @@ def test_interrupt_first_reset_next():
     assert chip.cycle > 9 + 2 * 256_000
 
 
+@pytest.mark.parametrize(("setting", "resets"), [(0x48, True), (0x40, False)], ids=["WDE and WDIE", "WDIE alone"])
+def test_an_interrupt_that_is_not_executed_before_the_next_time_out_resets(setting: int, resets: bool):
+    # 11.9.2, bit WDIE: so with interrupts off, in interrupt and system reset mode alone (table 11-1).
+    chip = Chip(assemble(WATCHDOG.format(vector="sbi 0x1E, 0\nreti", setting=setting, body="cli")))
+    assert chip.run_to(9 + 2 * 256_000 - 100) is StopCause.REACHED
+    assert chip.snapshot().state[0x60] == setting | 0x80
+    assert chip.run_to(9 + 2 * 256_000 + 100) is (StopCause.BREAK if resets else StopCause.REACHED)
+    assert chip.snapshot().state[0x3E] == 0
+
+
+def test_an_interrupt_executed_late_gives_the_program_a_whole_period_more():
+    # Interrupts are off until 1.5 periods have passed, by a busy loop of 4 cycles (sbiw, brne) and one around it.
+    wait = "cli\nldi r24, 0x00\nldi r25, 0x77\nwait: adiw r24, 1\nnop\nbrne wait\nsei\nstay: rjmp stay"
+    chip = Chip(assemble(WATCHDOG.format(vector="sbi 0x1E, 0\nreti", setting=0x48, body=wait)))
+    assert chip.run_to(9 + 2 * 256_000 - 100) is StopCause.REACHED
+    assert chip.snapshot().state[0x3E] == 1
+
+
 def test_the_watchdog_cannot_be_stopped_without_the_timed_sequence():
     body = "ldi r16, 0\nsts 0x60, r16"
     chip = Chip(assemble(WATCHDOG.format(vector="reti", setting=0x08, body=body)))
