@@ -74,6 +74,25 @@ def test_a_motion_that_goes_on_otherwise_is_held_against_the_line_again(first, t
     assert line.device.override_percent == min(asked, result.path_clock_percent)
 
 
+@pytest.mark.parametrize("from_segment", [-1, 10], ids=["at START", "in motion"])
+@pytest.mark.parametrize("asked", [100, 60, 3])
+def test_an_override_never_asks_for_more_than_a_slow_line_carries(from_segment, asked):
+    """The same line; what the owner asks for counts where it is slower."""
+    line, plan, told = ModelLine(Damage(delay_s=0.02), Damage(delay_s=0.02)), motion(300, ticks=64_000), []
+
+    def steer(stream):
+        if stream.executed_segments > from_segment and not told:
+            stream.override(asked)
+            told.append(stream.executed_segments)
+
+    result = stream_plan(line, plan, steer=steer)
+    assert from_segment < told[0] < 150
+    assert 5 < result.path_clock_percent < 60
+    orders = [frame for frame in frames_written(line) if frame.type_code == MessageType.OVERRIDE]
+    assert max(frame.payload[0] for frame in orders) <= result.path_clock_percent
+    assert line.device.override_percent == min(asked, result.path_clock_percent)
+
+
 def margin_of(segments, sent, seen, allowances=()):
     return line_margin(segments, sent, seen, BOARDS["uno"], allowances)
 

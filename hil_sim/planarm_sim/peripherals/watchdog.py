@@ -68,9 +68,10 @@ def write_watchdog(st: State, value: int, cycle: int) -> None:
 
 @inner
 def watchdog_timeout(st: State, cycle: int) -> None:
-    """Raise the interrupt flag, or ask for a reset; so does an interrupt not executed before the next time-out (11.9.2).
+    """Raise the interrupt flag, or ask for a reset.
 
-    That reset belongs to interrupt and system reset mode; interrupts alone never reset (table 11-1).
+    An interrupt that was not executed before the next time-out resets, too (11.9.2, bit WDIE): so in interrupt and
+    system reset mode; interrupts alone never reset (table 11-1).
     """
     unanswered = st[WDTCSR] & (WDIF | WDE) == WDIF | WDE
     if st[WDTCSR] & WDIE and not unanswered:

@@ -5,6 +5,8 @@ byte may cause, is taken back; one that was asked for and is not there is sent a
 RESUME that the device has not read yet undoes it.
 """
 
+from collections.abc import Callable
+
 from planarm.link.session import Session
 from planarm_wire.messages import HOLD_CODE, HostMessage, Override, Resume, State, Stop
 
@@ -12,15 +14,23 @@ from planarm_wire.messages import HOLD_CODE, HostMessage, Override, Resume, Stat
 class Orders:
     """Orders that wait for room on the line, and whether the device does what was asked.
 
+    The path clock's rate is asked for when it is sent: what the line carries may be known only then.
+
     Attributes:
         stop_wanted: the rest of the plan is to be dropped.
         unasked_holds: how often the device held by itself and was told to go on.
+
+    Args:
+        session: whose line it is.
+        rate: tells the path clock's rate.
     """
 
-    def __init__(self, session: Session) -> None:
+    def __init__(self, session: Session, rate: Callable[[], Override]) -> None:
         self.stop_wanted = False
         self.unasked_holds = 0
         self._session = session
+        self._rate = rate
+        self._rate_wanted = False
         self._hold_wanted = False
         self._hold_seq = 0
         self._waiting: list[HostMessage] = []
@@ -36,9 +46,9 @@ class Orders:
         self._hold_wanted = False
         self._waiting.append(Resume())
 
-    def override(self, order: Override) -> None:
+    def set_rate(self) -> None:
         """Let the path clock run at another rate."""
-        self._waiting.append(order)
+        self._rate_wanted = True
 
     def stop(self, *, quick: bool) -> None:
         """Drop the rest of the plan."""
@@ -53,6 +63,9 @@ class Orders:
         if held and not self._hold_wanted and not self._waiting and self._session.idle:
             self.unasked_holds += 1
             self._waiting.append(Resume())
+        if self._rate_wanted:
+            self._waiting.append(self._rate())
+            self._rate_wanted = False
         while self._waiting and self._session.fits(self._waiting[0]):
             self._session.send(self._waiting.pop(0), now_s)
 

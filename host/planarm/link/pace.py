@@ -49,17 +49,22 @@ class Pace:
             if self.percent < PERCENT:
                 self._warn(str(self.margin))
 
-    def set_again(self, left: Sequence[Segment], allowances: Sequence[Allowance]) -> Override | None:
-        """Decide on the rate for what is left of another plan; return what the device is to be told, if anything.
+    @property
+    def order(self) -> Override:
+        """What the device is to be told: as asked for, but no faster than the line carries."""
+        return Override(min(self.percent, self.asked_percent))
+
+    def set_again(self, left: Sequence[Segment], allowances: Sequence[Allowance]) -> bool:
+        """Decide on the rate for what is left of another plan; return whether it is another.
 
         It is seen from a full queue; while that fills the device slows down by itself.
         """
         if self._line is None:
-            return None
+            return False
         margin = line_margin(left, fill_queue(left, self._board), self._line, self._board, allowances)
         if margin.percent == self.percent:
-            return None
+            return False
         self.margin, self.percent = margin, margin.percent
         if margin.percent < PERCENT:
             self._warn(f"from here on {margin}")
-        return Override(min(margin.percent, self.asked_percent))
+        return True

@@ -32,7 +32,6 @@ from planarm_wire.messages import (
     Clear,
     Enable,
     Fault,
-    Override,
     Query,
     Segment,
     Start,
@@ -85,7 +84,7 @@ class Stream:
         self._seen: Status | None = None
         self._told_resent = 0
         self._feed = Feed(session, self.course, self._options.allowances, self._options.ahead_s)
-        self._orders = Orders(session)
+        self._orders = Orders(session, lambda: self.pace.order)
         self._joining = joining
         self._enabled = False
 
@@ -130,9 +129,9 @@ class Stream:
         self._orders.resume()
 
     def override(self, percent: int) -> None:
-        """Let the path clock run at 1 to 100 % of the planned rate."""
+        """Let the path clock run at 1 to 100 % of the planned rate, but no faster than the line carries the plan."""
         self.pace.asked_percent = percent
-        self._orders.override(Override(percent))
+        self._orders.set_rate()
 
     def stop(self, *, quick: bool = False) -> None:
         """Slow down along the path and drop the rest of the plan; `stopped` tells when the arm rests."""
@@ -156,9 +155,8 @@ class Stream:
         """
         self._feed.go_on_with(segments, allowances)
         executed = self.course.executed
-        order = self.pace.set_again(self.course.segments[executed:], self._feed.allowances[executed:])
-        if order is not None:
-            self._orders.override(order)
+        if self.pace.set_again(self.course.segments[executed:], self._feed.allowances[executed:]):
+            self._orders.set_rate()
 
     @property
     def deadline_s(self) -> float:
@@ -259,8 +257,8 @@ class Stream:
         self._feed.send(self._status, now_s)
         if self._session.idle:  # the queue is full, or the whole plan is in it
             self.pace.set(self.course.segments, self.sent_segments, self._feed.allowances, now_s)
-            if self._status.override_percent != self.pace.percent:
-                self._session.send(Override(self.pace.percent), now_s)
+            if self._status.override_percent != self.pace.order.percent:
+                self._session.send(self.pace.order, now_s)
             self._start_sent_s, self._lead_ticks_sent = now_s, self._lead_ticks(now_s)
             self._session.send(Start(self._lead_ticks_sent), now_s)
             self.phase = Phase.STARTING

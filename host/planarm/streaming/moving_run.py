@@ -103,7 +103,7 @@ class Timekeeper:
         percent = BRAKING_PERCENT if self._early_now_s > EARLY_S else FULL_PERCENT
         if percent != self._percent and (percent != FULL_PERCENT or self._early_now_s <= 0.0):
             self._percent = percent
-            stream.override(min(percent, stream.pace.percent))  # a slow line keeps what it was given
+            stream.override(percent)
 
     def _unheard_s(self, told: StreamProgress) -> float:
         """How late the arm is if it has stood still since it was last heard of; 0 while that was just now."""
