@@ -42,6 +42,7 @@ def test_shares_add_up_and_all_of_the_acceleration_costs_nothing():
     assert sum(b.share for b in report.binding) == pytest.approx(1.0)
     assert report.full_acceleration_s == motion.duration_s
     assert report.braking_cost == 0.0
+    assert report.words().endswith("% of the time"), report.words()
 
 
 def test_where_nothing_moves_nothing_holds_back():

@@ -67,7 +67,9 @@ class TimingReport:
         if not self.binding:
             return "nothing moves"
         held = ", ".join(f"joint {b.joint} {b.limit} {100.0 * b.share:.0f} %" for b in self.binding if b.share >= 0.005)
-        words = f"held back by {held} of the time; keeping a stop possible costs {100.0 * self.braking_cost:.1f} %"
+        words = f"held back by {held} of the time"
+        if self.braking_cost >= 0.0005:  # less reads 0.0 %
+            words += f"; keeping a stop possible costs {100.0 * self.braking_cost:.1f} %"
         if self.executed_s <= self.duration_s * (1.0 + SAME):
             return words
         more = 100.0 * (self.executed_s / self.duration_s - 1.0)
