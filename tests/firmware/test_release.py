@@ -139,6 +139,22 @@ def test_a_program_that_uses_a_register_of_the_interrupts_is_refused(tmp_path: P
 
 
 @needs_avr_gcc
+def test_an_interrupt_that_uses_a_register_of_the_compiler_is_refused(tmp_path: Path) -> None:
+    # The fractions of the steps lie in r12 to r15 where the board's code says so; platformio.ini must say it, too.
+    copy = tmp_path / "firmware"
+    shutil.copytree(FIRMWARE, copy, ignore=shutil.ignore_patterns("build", ".pio", "__pycache__"))
+    ini = copy / "platformio.ini"
+    source = ini.read_text(encoding="utf-8")
+    spoilt = source.replace("    -ffixed-r14\n", "")
+    assert spoilt != source
+    ini.write_text(spoilt, encoding="utf-8")
+    command = [sys.executable, str(copy / "build.py"), "avr", "--out", str(tmp_path / "out")]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 1
+    assert "uses a register of the compiler" in done.stderr
+
+
+@needs_avr_gcc
 def test_the_librarys_common_prologue_is_refused(tmp_path: Path) -> None:
     # It saves the interrupts' registers: what it is jumped into from stands in image.ld and hal/uno/prologue.cpp.
     copy = tmp_path / "firmware"
