@@ -13,7 +13,7 @@ namespace wire {
 // Both ends must have the same.
 constexpr uint8_t PROTOCOL_VERSION = 2;
 // Of the specification without its wording.
-constexpr uint32_t SPEC_HASH = 0x28E54E5DUL;
+constexpr uint32_t SPEC_HASH = 0xBDC44704UL;
 
 // Ends every frame.
 constexpr uint8_t DELIMITER = 0x7E;
@@ -68,6 +68,8 @@ constexpr uint32_t DEFAULT_WAKE_TICKS = 160000UL;
 constexpr uint8_t WATCHDOG_MS = 250;
 // A limit switch counts when it stays so for this long, 5 ms.
 constexpr uint32_t DEBOUNCE_TICKS = 80000UL;
+// Least interval of a homing, 4,000 steps/s: its steps are handed over one by one.
+constexpr uint16_t MIN_HOMING_TICKS = 4000U;
 // Largest interval inside a move that begins with a shorter one than slow_interval_ticks.
 constexpr uint16_t MAX_INTERVAL_TICKS = 65535U;
 // 4.1 ms; a move of two steps or more that begins with so long an interval is slow, and has limits
@@ -199,8 +201,8 @@ enum class Fault : uint8_t {
 
 // Why the device last started.
 enum class Reset : uint8_t {
-    // The chip does not tell, and its memory was in use before: the reset line, or a short loss of
-    // power.
+    // The chip does not tell, and its memory was in use before: the reset line, a short loss of
+    // power, or the watchdog where the main program stood still with interrupts off.
     UNKNOWN = 0,
     // Power came on.
     POWER_ON = 1,

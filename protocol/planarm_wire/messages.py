@@ -14,7 +14,7 @@ from planarm_wire.layout import EACH_JOINT, END, Field
 
 PROTOCOL_VERSION: Final = 2
 """Both ends must have the same."""
-SPEC_HASH: Final = 0x28E54E5D
+SPEC_HASH: Final = 0xBDC44704
 """Hash of the specification without its wording."""
 DELIMITER: Final = 0x7E
 """Ends every frame."""
@@ -74,6 +74,8 @@ WATCHDOG_MS: Final = 250
 """The watchdog resets the chip when the main program stands still for so long."""
 DEBOUNCE_TICKS: Final = 80_000
 """A limit switch counts when it stays so for this long, 5 ms."""
+MIN_HOMING_TICKS: Final = 4_000
+"""Least interval of a homing, 4,000 steps/s: its steps are handed over one by one."""
 MAX_INTERVAL_TICKS: Final = 65_535
 """Largest interval inside a move that begins with a shorter one than slow_interval_ticks."""
 SLOW_INTERVAL_TICKS: Final = 65_536
@@ -323,7 +325,8 @@ class Reset(IntEnum):
     """Why the device last started."""
 
     UNKNOWN = 0
-    """The chip does not tell, and its memory was in use before: the reset line, or a short loss of power."""
+    """The chip does not tell, and its memory was in use before: the reset line, a short loss of power, or the watchdog where the main program stood still with interrupts off.
+    """
     POWER_ON = 1
     """Power came on."""
     EXTERNAL = 2
@@ -688,7 +691,7 @@ class Home:
     positive: int
     """1 when the switch lies in the positive direction. (u8)"""
     fast_ticks: int
-    """Interval of the steps towards the switch. (ticks, u32)"""
+    """Interval of the steps towards the switch; at least min_homing_ticks. (ticks, u32)"""
     slow_ticks: int
     """Interval of the steps off it and onto it again; at least fast_ticks, and 2 debounce_ticks. (ticks, u32)"""
     most_usteps: int

@@ -35,6 +35,7 @@ from planarm_wire.messages import (
     HOLD_CODE,
     HOST_WINDOW_BYTES,
     MIN_DIR_SETUP_TICKS,
+    MIN_HOMING_TICKS,
     SLICE_TICKS,
     TICKS_HZ,
     Config,
@@ -411,6 +412,25 @@ def test_every_joint_homes_to_its_own_switch(name: str, joint: int, positive: in
     wanted[joint] = closes_at
     assert status.ledger.position_usteps == tuple(wanted)
     assert [board.position_at(number, board.now) for number in range(BOARDS[name].joints)] == wanted, "by the pins"
+
+
+@pytest.mark.parametrize("name", BOARDS)
+def test_a_homing_at_the_least_interval_is_on_its_ticks_on_a_busy_line(name: str) -> None:
+    # Frames that are refused, as many as the line carries: the main program has most to do there.
+    joints = BOARDS[name].joints
+    refused = Segments(0, 0, 0, (segment_of(96_000, *[run_of(200, first=0, interval=400)] * joints),))
+    for joint in range(joints):
+        board = switched_on(name)
+        board.ask(Home(joint, 1, MIN_HOMING_TICKS, 2 * DEBOUNCE_TICKS, 300, 100))
+        while (state := board.ask_now().state) is State.HOMING:
+            board.send(refused)
+            board.send(refused)
+        status = board.ask()
+        assert (state, status.fault) == (State.FAULT, Fault.HOMING_FAILED), joint
+        rises = board.rises(joint)
+        assert len(rises) == 300
+        between = {later - tick for tick, later in itertools.pairwise(rises)}
+        assert max(between) - min(between) <= 2 * MOST_OFF_TICKS.get(name, (0, 0))[joint], joint
 
 
 @pytest.mark.parametrize(("name", "joint"), [(name, joint) for name in OTHERS for joint in range(BOARDS[name].joints)])

@@ -73,7 +73,7 @@ def scripts(board: Wiring) -> list[bytes]:
         moving + wait(4) + frame(Segments(0, 0, 0, (segment_of(0, joints=joints),))) + wait(2),
         frame(Config(PinMap[board.pin_map.upper()], joints, 1, 0b1100, 0, 0, 56, (160_000,) * joints))
         + awake
-        + frame(Home(0, 1, 3000, 160_000, 400, 100))
+        + frame(Home(0, 1, 4000, 160_000, 400, 100))
         + wait(20)
         + bytes([INPUTS, 1])
         + wait(20),

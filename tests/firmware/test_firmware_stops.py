@@ -9,6 +9,7 @@ import pytest
 
 from firmware_board import (
     LEAD_TICKS,
+    REST,
     WAKE_TICKS,
     Board,
     Delays,
@@ -29,6 +30,7 @@ from planarm_wire.messages import (
     ENABLE_PIN,
     HOLD_CODE,
     JOINTS,
+    MIN_HOMING_TICKS,
     MIN_STEP_HIGH_TICKS,
     STEP_PINS,
     Clear,
@@ -225,6 +227,22 @@ def test_segments_outside_the_soft_limits_are_a_fault_that_says_which(firmware: 
     assert board.motion_edges() == []
 
 
+@pytest.mark.parametrize("joint", range(JOINTS))
+@pytest.mark.parametrize("sign", [1, -1])
+def test_each_side_of_the_soft_limits_is_kept(firmware: Firmware, joint: int, sign: int) -> None:
+    # The other side is as far away as can be.
+    far = 2**31 - 1
+    sides = [[-far, -far], [far, far]]
+    sides[sign > 0][joint] = sign * 9
+    for steps, fault in ((9, Fault.NONE), (10, Fault.SOFT_LIMIT)):
+        board = configured(firmware)
+        assert board.ask(SoftLimits(tuple(sides[0]), tuple(sides[1]))).refusal is Result.OK
+        moves = [REST, REST]
+        moves[joint] = run_of(steps, positive=sign > 0)
+        status = board.ask(Segments(0, 0, 0, (segment_of(30_000, *moves),)))
+        assert (status.fault, status.detail) == (fault, joint if fault else 0), steps
+
+
 def test_the_position_is_told_at_rest_only(firmware: Firmware) -> None:
     board = configured(firmware)
     assert board.ask(SetPosition((-70_000, 12))).ledger.position_usteps == (-70_000, 12)
@@ -411,13 +429,56 @@ def test_homing_ends_on_the_step_where_the_switch_closes(
     assert status.ledger.position_usteps == (0, closes_at)
 
 
-def test_a_touch_too_fast_for_the_debouncing_is_refused(firmware: Firmware) -> None:
+@pytest.mark.parametrize(
+    ("fast_ticks", "slow_ticks"),
+    [(MIN_HOMING_TICKS - 1, 2 * DEBOUNCE_TICKS), (MIN_HOMING_TICKS, 2 * DEBOUNCE_TICKS - 1)],
+    ids=["its steps cannot be handed over in time", "its touch is too fast for the debouncing"],
+)
+def test_a_homing_that_is_too_fast_is_refused(firmware: Firmware, fast_ticks: int, slow_ticks: int) -> None:
     board = Board(firmware)
     board.hello()
     board.ask(replace(WIRING, options=LIMITS))
     board.ask(Enable(1))
     board.run(WAKE_TICKS)
-    assert board.ask(Home(1, 0, 20_000, 2 * DEBOUNCE_TICKS - 1, 200, 100)).refusal is Result.OUT_OF_RANGE
+    assert board.ask(Home(1, 0, fast_ticks, slow_ticks, 200, 100)).refusal is Result.OUT_OF_RANGE
+    board.ask(Clear())
+    board.ask(Enable(1))
+    board.run(WAKE_TICKS)
+    assert board.ask(Home(1, 0, MIN_HOMING_TICKS, 2 * DEBOUNCE_TICKS, 200, 100)).state is State.HOMING
+
+
+@pytest.mark.parametrize("begins_on_the_switch", [False, True])
+def test_a_switch_that_does_not_open_again_is_a_fault(firmware: Firmware, begins_on_the_switch: bool) -> None:
+    # Welded, or with a broken wire: the joint goes back as far as told and not a step farther.
+    board = Board(firmware)
+    switches = Switches(firmware)
+    board.hello()
+    board.ask(replace(WIRING, options=LIMITS))
+    board.ask(Enable(1))
+    switches.set(hit=0b10 if begins_on_the_switch else 0)
+    board.run(WAKE_TICKS)
+    assert board.ask(Home(1, 0, 20_000, 2 * DEBOUNCE_TICKS, 200, 25)).state is State.HOMING
+    board.run(10 * 20_000)
+    switches.set(hit=0b10)
+    board.run(3_000_000 + 27 * 2 * DEBOUNCE_TICKS)
+    status = board.ask()
+    assert (status.state, status.fault, status.detail) == (State.FAULT, Fault.HOMING_FAILED, 1)
+    towards = len(board.rises(1)) - 25
+    assert towards == 0 if begins_on_the_switch else 10 <= towards <= 20
+    assert status.ledger.position_usteps == (0, 25 - towards)
+
+
+def test_a_homing_waits_until_the_drivers_are_awake(firmware: Firmware) -> None:
+    board = Board(firmware)
+    Switches(firmware)
+    board.hello()
+    board.ask(replace(WIRING, options=LIMITS, wake_ticks=2_000_000))
+    board.edges.clear()
+    board.ask(Enable(1))
+    energised = board.edges[-1].tick
+    assert board.ask(Home(0, 1, 20_000, 160_000, 30, 100)).state is State.HOMING
+    board.run(3_000_000)
+    assert 0 <= board.rises(0)[0] - (energised + 2_000_000) < 400_000  # the mark in EEPROM may come first
 
 
 def test_homing_without_a_switch_fails_within_its_distance(firmware: Firmware) -> None:

@@ -26,11 +26,10 @@ from planarm.model.transmission import Transmission
 from planarm.operations.arm_moves import move_straight
 from planarm.plan_file import arm_hash
 from planarm.scene import JointSpec, LimitSwitchSpec, Scene
-from planarm.stepping.train import least_reversal_ticks
 from planarm.stepping.windows import start_stop_ticks
 from planarm.streaming.configure import configure, falls_anywhere, require_no_drop_by_clear
 from planarm.streaming.standing import Standing, known_by, pose_of
-from planarm_wire.messages import DEBOUNCE_TICKS, Clear, Enable, Fault, Home, Query, State, Stop
+from planarm_wire.messages import DEBOUNCE_TICKS, MIN_HOMING_TICKS, Clear, Enable, Fault, Home, Query, State, Stop
 
 Warn = Callable[[str], None]
 
@@ -247,11 +246,14 @@ def _field_usteps(axis: JointSpec) -> int:
 
 
 def _home_order(scene: Scene, switch: LimitSwitchSpec) -> Home:
-    """Go to the switch at the start-stop speed, where motors may stop dead, and slowly off it and on again."""
+    """Go to the switch at the start-stop speed, where motors may stop dead, and slowly off it and on again.
+
+    No faster than the board hands over single steps.
+    """
     number = switch.joint - 1
     axis = scene.joints[number]
     low, high = scene.arm.joint_limits_rad[number]
-    fast = max(start_stop_ticks(axis), least_reversal_ticks(scene.board))
+    fast = max(start_stop_ticks(axis), MIN_HOMING_TICKS)
     return Home(
         joint=number,
         positive=int(switch.above != axis.reversed),
