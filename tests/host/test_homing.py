@@ -10,13 +10,15 @@ from broken_runs import SCENE, board
 from planarm.cli.main import main
 from planarm.errors import LinkError, SceneError
 from planarm.link.arm_record import ArmSetup
+from planarm.link.exchange import request
 from planarm.link.positions import Positions
 from planarm.link.transport import open_transport
 from planarm.operations.arm_moves import goto
 from planarm.operations.homing import Homed, Touched, home, prove_steps
 from planarm.scene import LimitSwitchSpec, load_scene
+from planarm.stepping.windows import start_stop_ticks
 from planarm.streaming.standing import look, pose_of, usteps_at
-from planarm_wire.messages import HOLD_CODE
+from planarm_wire.messages import HOLD_CODE, MIN_HOMING_TICKS, Home
 
 PORT = "/dev/ttyUNO"
 MICROSTEPS = 16
@@ -119,6 +121,28 @@ def test_losses_are_whole_turns_of_the_field_and_the_rest_is_the_switch():
 def test_there_is_nothing_to_prove_before_homing(scene, positions):
     with pytest.raises(LinkError, match=r"nothing to compare with.*not known.*planarm home SCENE"):
         prove_steps(arm_of(scene), PORT, scene, positions)
+
+
+@pytest.mark.parametrize(("acceleration_rad_s2", "fast_ticks"), [(1e5, MIN_HOMING_TICKS), (50.0, None)])
+def test_homing_goes_at_the_start_stop_speed_but_no_faster_than_the_board_takes(
+    scene, positions, monkeypatch, acceleration_rad_s2, fast_ticks
+):
+    joints = tuple(replace(axis, max_acceleration_rad_s2=acceleration_rad_s2) for axis in scene.joints)
+    orders = []
+
+    class TakenError(Exception):
+        pass
+
+    def take(transport, session, message):
+        if isinstance(message, Home):
+            orders.append(message)
+            raise TakenError
+        return request(transport, session, message)
+
+    monkeypatch.setattr("planarm.operations.homing.request", take)
+    with pytest.raises(TakenError):
+        home(arm_of(scene), PORT, replace(scene, joints=joints), positions)
+    assert [order.fast_ticks for order in orders] == [fast_ticks or start_stop_ticks(joints[0])]
 
 
 def test_homing_needs_a_switch_on_every_joint(scene, positions):
