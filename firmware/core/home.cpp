@@ -59,7 +59,8 @@ void reset() { hal::clear_at_start(homing); }
 
 bool is_good(const wire::Home& told) {
     static_assert(wire::MIN_HOMING_TICKS >= MIN_REVERSAL_TICKS, "the way back");
-    const bool slow_enough = told.fast_ticks >= wire::MIN_HOMING_TICKS && told.slow_ticks >= told.fast_ticks &&
+    const bool slow_enough = told.fast_ticks >= wire::MIN_HOMING_TICKS &&
+                             told.slow_ticks >= told.fast_ticks &&
                              told.slow_ticks >= 2 * wire::DEBOUNCE_TICKS;
     const bool short_enough = told.slow_ticks <= wire::MAX_SEGMENT_TICKS;
     return told.joint < wire::JOINTS && told.positive <= 1 && slow_enough && short_enough &&
