@@ -245,6 +245,28 @@ def test_slow_moves_lose_no_step_when_held(native_firmware: NativeFirmware, wait
         assert all(b - a >= q - p - 1 for (a, b), (p, q) in zip(pairwise(rises), pairwise(planned), strict=True))
 
 
+@pytest.mark.parametrize("percent", [60, 7, 1])
+def test_the_rate_that_is_told_is_that_of_the_steps(firmware: Firmware, percent: int) -> None:
+    # In mid-motion, where joint 1 makes a step each 800 ticks: down to the override without a way back, and up again.
+    player = Player(firmware, Profile((20_000.0, 12_360.0), (400_000.0, 400_000.0), 0.8, 90).motion())
+    player.start()
+    player.play_until(player.board.now + 20 * SEGMENT_TICKS)
+    for asked, sign in ((percent, -1), (100, 1)):
+        player.board.send(Override(asked))
+        rates = [player.fill().rate_percent]
+        while rates[-1] != asked:
+            player.board.run(4000)
+            rates.append(player.fill().rate_percent)
+            assert len(rates) < 1000, rates[-1]
+        assert rates == sorted(rates, reverse=sign < 0)
+        assert len(set(rates)) > 4, "it changes little by little"
+        player.board.run(2 * SEGMENT_TICKS * 100 // asked)
+        interval = player.board.rises(0)[-1] - player.board.rises(0)[-2]
+        assert interval == pytest.approx(800 * 100 / asked, abs=TICKS_OFF)
+        assert player.board.ask_now().rate_percent == asked
+    player.assert_all_steps_made()
+
+
 def test_at_full_rate_the_schedule_is_the_plan_bit_by_bit(firmware: Firmware) -> None:
     player = Player(firmware, FAST)
     player.board.ask(Override(37))
