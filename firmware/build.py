@@ -112,7 +112,9 @@ def require_free_registers(elf: Path, flags: list[str]) -> None:
     for function in listing.split("\n\n"):
         title, *lines = function.splitlines() or [""]
         name = title.partition("<")[2].rstrip(">:")
-        is_interrupt = re.fullmatch(r"__vector_(4|6|7|11|12|13|16|18|19)|_ZN3hal\d+(set_)?step_fraction\w+", name)
+        is_interrupt = re.fullmatch(
+            r"__vector_(4|6|7|8|11|12|13|16|18|19)|missed_step|_ZN3hal\d+(set_)?step_fraction\w+", name
+        )
         barred, whose = (lent, "the compiler") if is_interrupt else (kept, "the interrupts")
         for line in lines:
             address, _, instruction = line.partition(":\t")

@@ -9,7 +9,8 @@ from firmware_board import UNO, EmulatedFirmware
 from planarm_wire.boards import Board as Wiring
 
 # Numbers of the vectors, from 0.
-PIN_CHANGE, SCHEDULED, STEP_1, STEP_2, LAP, END_PULSES, RECEIVE, TRANSMIT = 4, 7, 11, 12, 13, 16, 18, 19
+PIN_CHANGE, SCHEDULED_3, SCHEDULED_4, STEP_1, STEP_2 = 4, 7, 8, 11, 12
+LAP, END_PULSES, RECEIVE, TRANSMIT = 13, 16, 18, 19
 ENTRY_CYCLES = 4
 INTERRUPTS_ON = 0x80
 CLI, WDR = b"\xf8\x94", b"\xa8\x95"

@@ -20,6 +20,7 @@ constexpr int32_t START_AHEAD_TICKS = 0x7000;
 constexpr uint16_t FREEZE_MARGIN_TICKS = 100 * wire::JOINTS;
 
 constexpr uint8_t twice(uint8_t mask) { return static_cast<uint8_t>(mask << 1); }
+constexpr uint8_t half(uint8_t mask) { return static_cast<uint8_t>(mask >> 1); }
 
 // A call takes less code than the product.
 [[gnu::noinline]] StepJoint& joint_at(uint8_t joint) { return step_joints[joint]; }
@@ -109,11 +110,12 @@ bool start_when_due(uint8_t joint, uint8_t mask) {
     }
 }
 
-// Whether no joint that is on has a pulse that is high, or a step that comes soon.
+// Whether no joint that is on has a pulse that is high, or a step that comes soon. The last joint first: it
+// waits longest for others, and is not to wait for the lock besides.
 bool may_freeze(uint8_t on, uint16_t counter) {
     const uint8_t high = hal::step_levels_high();
-    uint8_t mask = hal::FIRST_MASK;
-    for (uint8_t joint = 0; joint < wire::JOINTS; ++joint, mask = twice(mask)) {
+    uint8_t mask = hal::FIRST_MASK << (wire::JOINTS - 1);
+    for (uint8_t joint = wire::JOINTS; joint-- != 0; mask = half(mask)) {
         if ((on & mask) == 0) continue;
         // An edge that is past, and whose interrupt is only on its way, is no more than some hundred ticks
         // away.
@@ -204,8 +206,9 @@ void append(uint8_t joint, bool near) {
 }
 
 bool serve() {
-    if (missed()) return false;
+    // Read in this order: those that a missed step has switched off are not to be started.
     const uint8_t on = hal::step_interrupts_on();
+    if (missed()) return false;
     uint8_t mask = hal::FIRST_MASK;
     for (uint8_t joint = 0; joint < wire::JOINTS; ++joint, mask = twice(mask)) {
         if ((on & mask) != 0 || start_when_due(joint, mask)) continue;
@@ -244,7 +247,7 @@ void drop_runs() {
     step_missed = 0;
 }
 
-// Locked for 47 to 62 cycles, with four joints up to 202, which a step that comes meanwhile can bear: joints
+// Locked for 47 to 62 cycles, with four joints up to 224, which a step that comes meanwhile can bear: joints
 // that may stop dead step far slower than the least interval.
 bool freeze(uint32_t& now_ticks) {
     uint8_t on;

@@ -12,15 +12,15 @@ SECOND_MATCH_TICKS: Final = 38 + 90
 """A step whose pulse ends by a second match: an interrupt at its rise and one at its fall."""
 PORT_TICKS: Final = 84
 """A step on another pin by the same interrupt."""
-SHARED_TICKS: Final = 210
-"""A step of joint 3 or 4, alone in their interrupt; two in one take less than twice as long."""
+SCHEDULED_TICKS: Final = 63 + 106
+"""A step of joint 3 or 4: an interrupt at its rise and one at its fall."""
 
 STEP_INTERRUPT_TICKS: Final[dict[str, tuple[int, ...]]] = {
     "uno": (COMPARE_TICKS,) * 2,
-    "uno_four": (RUN_COMPARE_TICKS,) * 2 + (SHARED_TICKS,) * 2,
+    "uno_four": (RUN_COMPARE_TICKS,) * 2 + (SCHEDULED_TICKS,) * 2,
     "uno_slow": (SECOND_MATCH_TICKS,) * 2,
     "cnc_shield": (PORT_TICKS,) * 2,
-    "cnc_shield_four": (PORT_TICKS,) * 2 + (SHARED_TICKS,) * 2,
+    "cnc_shield_four": (PORT_TICKS,) * 2 + (SCHEDULED_TICKS,) * 2,
 }
 """Of each board, by its name: each joint's step."""
 

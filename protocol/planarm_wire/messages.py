@@ -129,7 +129,7 @@ BOARDS: Final[dict[str, Board]] = {
     ),
     "uno_four": Board(
         name="uno_four",
-        doc="Own wiring, four joints: joints 1 and 2 as with two, joints 3 and 4 stepped by one interrupt",
+        doc="Own wiring, four joints: joints 1 and 2 as with two, joints 3 and 4 stepped by interrupts",
         pin_map="own",
         joints=4,
         queue_bytes=582,

@@ -171,7 +171,7 @@ def test_the_librarys_common_prologue_is_refused(tmp_path: Path) -> None:
 
 
 # Two of each are the instruction between two interrupts. firmware/README.md, budgets: with 11 the sum of `uno` is its
-# least interval of 225. `uno_four` has four joints to look at, of 1,000.
+# least interval of 225. `uno_four` has four joints to look at; its sum is 651 of 1,000.
 LOCK_CYCLES = {"uno": 13, "uno_four": 17, "uno_slow": 17}
 # Around the start of a joint at rest (the sum leaves 88, as no step of that joint waits for the other's), what rests,
 # and what ends a motion; but in the last the other joint may step. What loops over four joints is counted once.

@@ -8,7 +8,8 @@
 //            Where drivers need long pulses (SECOND_MATCH) an armed pin falls at a second match, and the
 //            interrupt of the first only sets its tick: second_match.h.
 // MATCH      joints 0 and 1 on any pins: the interrupt of the same match makes the pulse, whole.
-// SCHEDULED  joints 2 and 3: Timer2's interrupt makes the pulse, whole, when Timer1 says so: scheduled.cpp.
+// SCHEDULED  joints 2 and 3: Timer2's interrupts make the pulse, one each edge, when Timer1 says so:
+//            scheduled.cpp.
 //
 // What the step interrupts of joints 0 and 1 need at every step is where IN and OUT reach it: the steps left
 // of each joint's run in GPIOR0 and GPIOR1.
@@ -62,22 +63,16 @@ constexpr uint8_t ALL_DISARMED = output<0>() == Output::COMPARE ? _BV(COM1A1) | 
 // Timer1's interrupts while nothing steps.
 constexpr uint8_t ONLY_LAPS = _BV(TOIE1);
 
-// A joint that Timer2's interrupt steps.
-struct ScheduledJoint {
-    uint16_t edge;
-    uint8_t left;
-};
-
 HAL_INLINE bool is_scheduled(uint8_t joint) { return planarm::wire::JOINTS > 2 && joint >= 2; }
+// Steps left of joints that Timer2's interrupts step. A step is counted when its pin rises; the tick of the
+// current one and its fraction are in the run.
 constexpr uint8_t SCHEDULED_JOINTS = planarm::wire::JOINTS > 2 ? planarm::wire::JOINTS - 2 : 1;
-extern ScheduledJoint scheduled[SCHEDULED_JOINTS];
-// step_interrupt_mask of those that are on.
-extern volatile uint8_t scheduled_on;
-// A scheduled step may rise so much before its tick: two that are nearer to each other rise together.
-constexpr uint16_t SCHEDULED_EARLY_TICKS = 180;
+extern volatile uint8_t scheduled_left[SCHEDULED_JOINTS];
+// A scheduled step may rise so much before its tick.
+constexpr uint16_t SCHEDULED_EARLY_TICKS = 190;
 
-// Lets Timer2's interrupt come and look.
-void wake_scheduled();
+// Lets the interrupt of a scheduled joint, told by its bit, come and look.
+void wake_scheduled(uint8_t mask);
 
 // The last emergency's cause, as an interrupt wrote it, and whether the host knows (serial.cpp).
 extern volatile uint8_t emergency_state;
@@ -126,13 +121,16 @@ HAL_INLINE uint16_t step_early_ticks(uint8_t joint) {
     return is_scheduled(joint) ? SCHEDULED_EARLY_TICKS : 0;
 }
 
-// The tick of the next step. Interrupts must be off.
-HAL_INLINE volatile uint16_t& edge_of(uint8_t joint) {
-    static_assert(_SFR_MEM_ADDR(OCR1B) == _SFR_MEM_ADDR(OCR1A) + 2, "an array");
-    return is_scheduled(joint) ? scheduled[joint - 2].edge : (&OCR1A)[joint];
+// The tick of the next step, or of the last one until its interrupt has placed the next. Scheduled joints
+// find it in their run. Interrupts must be off.
+static_assert(_SFR_MEM_ADDR(OCR1B) == _SFR_MEM_ADDR(OCR1A) + 2, "an array");
+uint16_t edge_of_four(uint8_t joint);
+HAL_INLINE uint16_t step_edge(uint8_t joint) {
+    return planarm::wire::JOINTS > 2 ? edge_of_four(joint) : (&OCR1A)[joint];
 }
-HAL_INLINE uint16_t step_edge(uint8_t joint) { return edge_of(joint); }
-HAL_INLINE void step_set_edge(uint8_t joint, uint16_t tick) { edge_of(joint) = tick; }
+HAL_INLINE void step_set_edge(uint8_t joint, uint16_t tick) {
+    if (!is_scheduled(joint)) (&OCR1A)[joint] = tick;
+}
 
 // Takes the pins of disarmed compare outputs low.
 HAL_INLINE void steps_fall() {
@@ -143,7 +141,7 @@ HAL_INLINE void steps_fall() {
 volatile uint8_t& left_of_four(uint8_t joint);  // a call takes less code where there are four
 HAL_INLINE volatile uint8_t& left_of(uint8_t joint) {
     if (__builtin_constant_p(joint))
-        return joint == 0 ? GPIOR0 : joint == 1 ? GPIOR1 : scheduled[joint - 2].left;
+        return joint == 0 ? GPIOR0 : joint == 1 ? GPIOR1 : scheduled_left[joint - 2];
     return planarm::wire::JOINTS > 2 ? left_of_four(joint) : joint == 0 ? GPIOR0 : GPIOR1;
 }
 HAL_INLINE uint8_t steps_left(uint8_t joint) { return left_of(joint); }
@@ -161,12 +159,14 @@ void set_step_fraction(uint8_t joint, uint16_t fraction);
 // Each joint has a bit, joint 0 this one and each further joint twice the one before: in TIMSK1, TIFR1 and,
 // as OC1A and OC1B, in PINB, and in what tells all joints'.
 constexpr uint8_t FIRST_MASK = _BV(OCIE1A);
+static_assert(4 * FIRST_MASK == _BV(OCIE2A) << 2 && 8 * FIRST_MASK == _BV(OCIE2B) << 2, "TIMSK2, twice left");
 static_assert(FIRST_MASK == _BV(OCF1A) && 2 * FIRST_MASK == _BV(OCIE1B) && 2 * FIRST_MASK == _BV(OCF1B),
               "TIFR1");
 constexpr uint8_t COMPARE_PINS = output<0>() == Output::COMPARE ? mask_of(9) | mask_of(10) : 0;
 static_assert(FIRST_MASK == mask_of(9) && 2 * FIRST_MASK == mask_of(10), "PINB");
 
-// Of the step pins those that are high. Main never sees a pulse that an interrupt makes whole.
+// Of the step pins those that are high. Main never sees a pulse that an interrupt makes whole, and scheduled
+// ones, counted when they rise, are near enough to their tick to be no matter.
 HAL_INLINE uint8_t step_levels_high() { return COMPARE_PINS != 0 ? PINB & COMPARE_PINS : 0; }
 
 // The same of those whose rise is not counted yet, in an instruction or two. With a second match the flags
@@ -188,8 +188,7 @@ HAL_INLINE void step_forget_match(uint8_t joint, uint8_t mask) {
 // Lets a joint's interrupt come; its pin must be low and disarmed.
 HAL_INLINE void step_start(uint8_t joint, uint8_t mask) {
     if (is_scheduled(joint)) {
-        scheduled_on = static_cast<uint8_t>(scheduled_on | mask);
-        wake_scheduled();
+        wake_scheduled(mask);
         return;
     }
     if (COMPARE_PINS != 0) {
@@ -202,16 +201,16 @@ HAL_INLINE void step_start(uint8_t joint, uint8_t mask) {
 
 // The bits of the joints whose interrupts are on, and others.
 HAL_INLINE uint8_t step_interrupts_on() {
-    return planarm::wire::JOINTS > 2 ? static_cast<uint8_t>(TIMSK1 | scheduled_on) : TIMSK1;
+    return planarm::wire::JOINTS > 2 ? static_cast<uint8_t>(TIMSK1 | TIMSK2 << 2) : TIMSK1;
 }
 
 HAL_INLINE void step_interrupts_off() {
     TIMSK1 = ONLY_LAPS;
-    if (planarm::wire::JOINTS > 2) scheduled_on = TIMSK2 = 0;
+    if (planarm::wire::JOINTS > 2) TIMSK2 = 0;
 }
 
 // A step that is made at all may rise so much later than its tick, where an interrupt makes it.
-constexpr uint16_t LATE_TICKS = output<0>() == Output::COMPARE && planarm::wire::JOINTS == 2 ? 0 : 512;
+constexpr uint16_t LATE_TICKS = output<0>() == Output::COMPARE && planarm::wire::JOINTS == 2 ? 0 : 560;
 
 // From the reading of the timer in end_steps to the last match that its writing of TCCR1A lets act.
 constexpr uint16_t END_TICKS = 4;
@@ -238,9 +237,14 @@ HAL_INLINE uint16_t end_steps() {
 // Turns of 3 cycles that pass the least high time of a pulse that may have risen just now.
 constexpr uint8_t HIGH_TURNS = planarm::wire::MIN_STEP_HIGH_TICKS / 3 + 1;
 
+// Takes scheduled ones low, too: they are counted.
 inline void wait_step_high() {
     uint8_t turns = HIGH_TURNS;
     __asm__ __volatile__("1: dec %0\n\tbrne 1b" : "+r"(turns));
+    if (planarm::wire::JOINTS > 2) {
+        write_pin(planarm::wire::STEP_PINS[2 % planarm::wire::JOINTS], false);
+        write_pin(planarm::wire::STEP_PINS[3 % planarm::wire::JOINTS], false);
+    }
 }
 
 // Sets a joint's DIR; true when it changed.

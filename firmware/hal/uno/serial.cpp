@@ -107,6 +107,20 @@ void emergency_clear() {
 
 }  // namespace hal
 
+namespace {
+
+// Step pins of joints 2 and 3, where there are any.
+template <uint8_t JOINT>
+constexpr uint8_t scheduled_pin() {
+    return planarm::wire::STEP_PINS[JOINT % planarm::wire::JOINTS];
+}
+template <uint8_t JOINT>
+constexpr uint8_t scheduled_port() {
+    return static_cast<uint8_t>(hal::port_of(scheduled_pin<JOINT>()));
+}
+
+}  // namespace
+
 static_assert(_SFR_MEM_ADDR(TIMSK2) == _SFR_MEM_ADDR(TIMSK1) + 1, "%[timsk] + 1");
 static_assert(static_cast<uint8_t>(hal::Emergency::LINE) == 1 && hal::ONLY_LAPS == 1 && _BV(CS00) == 1,
               "what r30 is at the last emergency byte");
@@ -115,7 +129,7 @@ static_assert(static_cast<uint8_t>(hal::Emergency::LINE) == 1 && hal::ONLY_LAPS 
 
 // Cycles with entry and jump: 36 for a byte stored, 39 for one that finds no room, 42 and 43 of the same
 // after an overrun, 35 for a hold, 33 for an emergency byte that is not the last and 40 for the last, with
-// four joints 45. A byte comes every 640 at the fastest. Bytes lost before a hold or an emergency byte are
+// four joints 43. A byte comes every 640 at the fastest. Bytes lost before a hold or an emergency byte are
 // not counted. From the 31st cycle of the last emergency byte on no pin rises; those that are high timer 0's
 // interrupt takes low, once they have been so for the least high time.
 ISR(USART_RX_vect, ISR_NAKED) {
@@ -178,13 +192,14 @@ ISR(USART_RX_vect, ISR_NAKED) {
         .if %[all_disarmed]
         ldi  r31, %[all_disarmed]
         sts  %[tccra], r31
+        .endif
+        .if %[all_disarmed] || %[joints] > 2
         out  %[tccr0b], r30             ; timer 0 starts
         .endif
         sts  %[timsk], r30
         .if %[joints] > 2
         ldi  r31, 0
         sts  %[timsk] + 1, r31
-        sts  %[scheduled_on], r31
         .endif
         movw r30, r4
         out  %[sreg], r2
@@ -196,11 +211,10 @@ ISR(USART_RX_vect, ISR_NAKED) {
         [full] "i"(&hal::ring_full), [overruns] "i"(&hal::overruns), [holds] "i"(&hal::holds),
         [repeats] "M"(planarm::wire::EMERGENCY_REPEATS), [all_disarmed] "i"(hal::ALL_DISARMED),
         [tccra] "i"(&TCCR1A), [tccr0b] "I"(_SFR_IO_ADDR(TCCR0B)), [timsk] "i"(&TIMSK1),
-        [state] "i"(&hal::emergency_state), [joints] "n"(planarm::wire::JOINTS),
-        [scheduled_on] "i"(&hal::scheduled_on));
+        [state] "i"(&hal::emergency_state), [joints] "n"(planarm::wire::JOINTS));
 }
 
-// The stop input's contact opened: what the last emergency byte does, in 29 cycles, with four joints 34; 12
+// The stop input's contact opened: what the last emergency byte does, in 29 cycles, with four joints 32; 12
 // when it closes.
 ISR(PCINT1_vect, ISR_NAKED) {
     __asm__ __volatile__(
@@ -218,13 +232,17 @@ ISR(PCINT1_vect, ISR_NAKED) {
         [input] "M"(static_cast<uint8_t>(hal::Emergency::INPUT)), [state] "i"(&hal::emergency_state));
 }
 
-// Ends the pulses that an emergency has found high, in 20 cycles.
+// Ends the pulses that an emergency has found high, in 20 cycles, with four joints 24.
 ISR(TIMER0_OVF_vect, ISR_NAKED) {
     __asm__ __volatile__(
         R"(
         mov  r4, r30
         ldi  r30, %[all_forced]
         sts  %[tccrc], r30
+        .if %[joints] > 2
+        cbi  %[port2], %[bit2]
+        cbi  %[port3], %[bit3]
+        .endif
         ldi  r30, 0
         out  %[tccr0b], r30
         ldi  r30, %[count]
@@ -233,7 +251,9 @@ ISR(TIMER0_OVF_vect, ISR_NAKED) {
         reti
         )" ::[all_forced] "M"(_BV(FOC1A) | _BV(FOC1B)),
         [tccrc] "i"(&TCCR1C), [tccr0b] "I"(_SFR_IO_ADDR(TCCR0B)), [count] "M"(hal::END_COUNT),
-        [tcnt0] "I"(_SFR_IO_ADDR(TCNT0)));
+        [tcnt0] "I"(_SFR_IO_ADDR(TCNT0)), [joints] "n"(planarm::wire::JOINTS),
+        [port2] "I"(scheduled_port<2>()), [bit2] "I"(hal::bit_of(scheduled_pin<2>())),
+        [port3] "I"(scheduled_port<3>()), [bit3] "I"(hal::bit_of(scheduled_pin<3>())));
 }
 
 // Cycles with entry and jump: 34 for a byte, 39 for one that must be escaped, 35 for the delimiter; once

@@ -15,9 +15,10 @@
 //   on and back               77       56              59                71
 //   going idle                73       56
 //   a step missed             82, of joint 2 84
-// With the fraction in the run one step after another takes 83, and the pin falls after 64.
-// tests/firmware/test_firmware_cycles.py counts them. The least interval of one joint covers what may run
-// when its step rises: what is left of a receive interrupt without room (39), a lock of the main program
+// With the fraction in the run one step after another takes 83, and the pin falls after 64. With four joints
+// a step missed takes 94 and 96, on the shield 103 and 105, in a turn 107 and 109: joints 3 and 4 end there,
+// too. tests/firmware/test_firmware_cycles.py counts them. The least interval of one joint covers what may
+// run when its step rises: what is left of a receive interrupt without room (39), a lock of the main program
 // (11), the other joint's interrupt (in a turn 77), the one instruction that comes between two interrupts
 // (2), its own way to the look at the timer (58), and what that asks for (38): 225, all of it. So a lock and
 // the two instructions behind it may take 13 cycles: tests/firmware/test_release.py looks at each.
@@ -54,6 +55,14 @@ static_assert(hal::output<0>() != hal::Output::COMPARE ||
                   (port_of(wire::DIR_PINS[0]) != port_of(wire::STEP_PINS[0]) &&
                    port_of(wire::DIR_PINS[1]) != port_of(wire::STEP_PINS[1])),
               "no step pin that changes in between");
+
+// Ports and bits of joints 3 and 4, a byte each; 0 without them.
+constexpr uint32_t pin_bytes(uint8_t pin) {
+    return static_cast<uint32_t>(port_of(pin)) << 8 | hal::bit_of(pin);
+}
+constexpr uint32_t SCHEDULED_PINS = wire::JOINTS > 2 ? pin_bytes(wire::STEP_PINS[2 % wire::JOINTS]) << 16 |
+                                                           pin_bytes(wire::STEP_PINS[3 % wire::JOINTS])
+                                                     : 0;
 
 // The first of the joint's two registers for the fraction, 0 where that is in the run; the assembler takes
 // registers by number.
@@ -204,12 +213,15 @@ HAL_INLINE void step_interrupt() {
 
     5:
         .if %[foc] == 0x40               ; a step is missed: joint 1 has it
-        rjmp .Lmissed_step
+        rjmp missed_step
         .else
-    .Lmissed_step:
+        .global missed_step             ; with Z in r4, SREG in r2; scheduled.cpp comes here, too
+    missed_step:
         lds  r30, %[timsk]
-        .if %[joints] > 2
-        lds  r31, %[scheduled_on]
+        .if %[scheduled]
+        lds  r31, %[timsk] + 1
+        lsl  r31
+        lsl  r31
         or   r30, r31
         .endif
         sts  %[missed], r30
@@ -217,10 +229,11 @@ HAL_INLINE void step_interrupt() {
         sts  %[tccra], r30
         ldi  r30, 1                     ; hal::ONLY_LAPS
         sts  %[timsk], r30
-        .if %[joints] > 2
+        .if %[scheduled]
         ldi  r30, 0
-        sts  %[scheduled_on], r30
         sts  %[timsk] + 1, r30
+        cbi  %[scheduled] >> 24, (%[scheduled] >> 16) & 7  ; a pulse that rose more than 56 cycles ago
+        cbi  (%[scheduled] >> 8) & 31, %[scheduled] & 7    ; and is counted
         .endif
         movw r30, r4
         out  %[sreg], r2
@@ -266,7 +279,7 @@ HAL_INLINE void step_interrupt() {
         [dir_port] "I"(port_of(wire::DIR_PINS[JOINT])), [dir_bit] "I"(hal::bit_of(wire::DIR_PINS[JOINT])),
         [missed] "i"(&step_missed), [by_match] "n"(hal::output<JOINT>() == hal::Output::MATCH ? 1 : 0),
         [step_port] "I"(port_of(wire::STEP_PINS[JOINT])), [step_bit] "I"(hal::bit_of(wire::STEP_PINS[JOINT])),
-        [joints] "n"(wire::JOINTS), [scheduled_on] "i"(&hal::scheduled_on));
+        [scheduled] "n"(SCHEDULED_PINS));
 }
 
 }  // namespace

@@ -1,5 +1,5 @@
 // The board uno_four: Own wiring, four joints: joints 1 and 2 as with two, joints 3 and 4 stepped
-// by one interrupt.
+// by interrupts.
 //
 // Generated from protocol/messages.toml by `python -m planarm_wire.generate`; do not edit.
 #pragma once

@@ -1,15 +1,33 @@
-// Joints 2 and 3: both are stepped by Timer2's interrupt, which looks at Timer1 for when.
+// Joints 2 and 3: Timer2's two interrupts step one each; they look at Timer1 for when.
 //
-// Timer2 counts at a 32nd of the clock and only wakes; Timer1 tells the time. A joint whose step is due, or
-// nearly so, is raised at once, both joints in the same few cycles; only then each step is counted, its pulse
-// taken low and its next edge computed, as on_match of core/on_match.h does it, statement by
-// statement. So neither waits for the other's computation: a step rises at most SCHEDULED_EARLY_TICKS early,
-// or as late as Timer2's grain and another interrupt hold this one up.
+// Timer2 counts at a 32nd of the clock and only wakes; Timer1 tells the time. A step takes two interrupts.
+// The first, of the wake that was set for the step, raises the pin when the step is due, or nearly so, counts
+// it, and sets a wake two counts later. The second, which finds the pin high, takes it low, computes the next
+// edge as on_match of core/on_match.h does it, statement by statement, and sets the wake for that. So nothing
+// else waits for longer than one of them takes, and between the two of a step others may come. The tick of
+// the current step and its fraction are in the run itself.
 //
-// Like the interrupts of joints 0 and 1 (step_interrupts.cpp) it needs no stack and uses the registers that
-// no compiled code uses. Cycles with entry and jump, counted by
-// tests/firmware/test_firmware_boards.py: a look 62 to 76, one joint's step 127 to 210 with the looks before
-// and after it, both joints' 278 to 288.
+// Whoever disarms the joints between the two takes the pins low: the interrupt that finds a step missed,
+// timer 0's after an emergency (serial.cpp), and hal::wait_step_high. A freeze is not made then: it keeps a
+// greater distance from a step than a pin rises early.
+//
+// Like the interrupts of joints 0 and 1 (step_interrupts.cpp) they need no stack and use registers that no
+// compiled code uses: r2 to r11. Cycles with entry (4) and the jump from the vector (3), of joint 2 and of
+// joint 3, counted by tests/firmware/test_firmware_scheduled.py:
+//   rise                      61, 63, the pin rises after 40 and 41, 16 after the look at Timer1
+//   a look too early          58, 59
+//   one step after another   106, 105, the pin falls after 20
+//   on in one direction       86, 84
+//   on and back              107, 104
+//   going idle                67, 64
+//   a step missed             67, in a turn 103, 99
+//
+// The wake for a step is set so that the pin rises 93 to 161 ticks before its tick if nothing else runs. What
+// may run when it comes: a step of another joint (joint 3's 105, joint 1's on the shield 90), a lock of the
+// main program that begins right behind it (15, or 79 when a joint is started or a freeze finds joint 3
+// too near), the instructions around it (4), and for joint 3 the interrupt of joint 2 (107, and 2). So joint
+// 2 rises up to 95 ticks late, joint 3 up to 189. None rises more than 174 early: a look that comes for
+// another reason and finds the step less than SCHEDULED_EARLY_TICKS away raises it at once.
 
 #include <avr/interrupt.h>
 #include <avr/io.h>
@@ -20,19 +38,31 @@
 
 namespace hal {
 
-ScheduledJoint scheduled[SCHEDULED_JOINTS];
-volatile uint8_t scheduled_on;
+volatile uint8_t scheduled_left[SCHEDULED_JOINTS];
 
 volatile uint8_t& left_of_four(uint8_t joint) {
-    return joint == 0 ? GPIOR0 : joint == 1 ? GPIOR1 : scheduled[joint - 2].left;
+    return joint == 0 ? GPIOR0 : joint == 1 ? GPIOR1 : scheduled_left[joint - 2];
 }
 
-void wake_scheduled() {
-    // A wake-up of the other joint that is nearer stays, and one that is due is not forgotten: each look sets
-    // the next.
-    const bool is_nearer = (TIMSK2 & _BV(OCIE2A)) != 0 && static_cast<uint8_t>(OCR2A - TCNT2) <= 2;
-    if (!is_nearer) OCR2A = static_cast<uint8_t>(TCNT2 + 2);
-    TIMSK2 = _BV(OCIE2A);
+uint16_t edge_of_four(uint8_t joint) {
+    if (joint == 0) return OCR1A;
+    if (joint == 1) return OCR1B;
+    const planarm::Run* const run =
+        joint == 2 ? planarm::step_joints[2].active : planarm::step_joints[3].active;
+    return static_cast<uint16_t>(run->first_ticks);
+}
+
+namespace {
+
+// The nearest wake, in counts of Timer2: one that is set at the very end of a count comes after 64 ticks.
+constexpr uint8_t WAKE_COUNTS = 2;
+
+}  // namespace
+
+void wake_scheduled(uint8_t mask) {
+    volatile uint8_t& wake = mask == 4 * FIRST_MASK ? OCR2A : OCR2B;
+    wake = static_cast<uint8_t>(TCNT2 + WAKE_COUNTS);
+    TIMSK2 = static_cast<uint8_t>(TIMSK2 | mask >> 2);
 }
 
 }  // namespace hal
@@ -40,236 +70,195 @@ void wake_scheduled() {
 namespace {
 
 using hal::SCHEDULED_EARLY_TICKS;
-using hal::ScheduledJoint;
 using planarm::Chain;
 using planarm::Run;
 using planarm::step_joints;
-using planarm::step_missed;
 namespace engine = planarm::step_engine;
 namespace wire = planarm::wire;
 
-// From the look at Timer1 to the setting of Timer2.
-constexpr uint16_t LOOK_TICKS = 40;
-// A step that would rise later than 12 us after its tick is missed: joint 2's pin rises 20 after the look at
-// Timer1, joint 3's 40 when joint 2 is on.
-constexpr uint16_t LATEST_TICKS = 192 - 20;
-// As far as Timer2 wakes, less the early ticks: 240 of its counts.
-constexpr uint16_t FARTHEST_TICKS = 240 * 32 - SCHEDULED_EARLY_TICKS;
+// A step that would rise later than 12 us after its tick is missed: the pin rises 16 after the look at
+// Timer1.
+constexpr uint16_t LATEST_TICKS = 192 - 16;
+
+// What the nearest wake takes off the distance to an edge, beyond the early ticks.
+constexpr uint8_t LEAST_TICKS = 63;
 
 constexpr uint8_t port_of(uint8_t pin) { return static_cast<uint8_t>(hal::port_of(pin)); }
 
-static_assert(offsetof(ScheduledJoint, edge) == 0 && offsetof(ScheduledJoint, left) == 2 &&
-                  sizeof(ScheduledJoint) == 3 && sizeof(planarm::StepJoint) == 95,
-              "the macros' offsets");
 static_assert(static_cast<uint8_t>(Chain::NONE) == 0 && static_cast<uint8_t>(Chain::REVERSED) == 2,
-              "likewise");
-static_assert(hal::FIRST_MASK << 2 == 0x08, "bits of r3");
-static_assert(hal::ONLY_LAPS == 1, "what a missed step leaves on");
-static_assert(_SFR_MEM_ADDR(TIMSK2) == _SFR_MEM_ADDR(TIMSK1) + 1, "%[timsk] + 1");
+              "tst, and bit 1 of r3");
+static_assert(_SFR_MEM_ADDR(TCNT1) == _SFR_MEM_ADDR(TCCR1A) + 4, "%[tccra] + 4");
 static_assert(_SFR_MEM_ADDR(TCNT2) == _SFR_MEM_ADDR(TCCR1A) + 0x32, "%[tccra] + 0x32");
 static_assert(_SFR_MEM_ADDR(OCR2A) == _SFR_MEM_ADDR(TCCR1A) + 0x33, "%[tccra] + 0x33");
-static_assert(_SFR_MEM_ADDR(TCNT1) == _SFR_MEM_ADDR(TCCR1A) + 4, "%[tccra] + 4");
+static_assert(_SFR_MEM_ADDR(OCR2B) == _SFR_MEM_ADDR(TCCR1A) + 0x34, "%[tccra] + 0x34");
 
 }  // namespace
 
 ISR(TIMER2_COMPA_vect, ISR_NAKED) {
     __asm__ __volatile__(
         R"(
-        ; look JOINT, PORT, BIT: raises the pin and notes it in r10 when the step is due, else finds the nearest
-        .macro look joint port bit
-        sbrs r3, 3 + \joint
+        in   r2, %[sreg]
+        clt                             ; T tells joint 3 from joint 2
+        movw r4, r30
+        lds  r30, %[active]
+        lds  r31, %[active] + 1
+        lds  r3, %[left]
+        sbis %[port2], %[bit2]
         rjmp 1f
-        lds  r24, %[joints] + 3 * \joint
-        lds  r25, %[joints] + 3 * \joint + 1
-        sub  r24, r8
-        sbc  r25, r9
-        subi r24, lo8(%[early])
-        sbci r25, hi8(%[early])
-        brmi 2f
-        cp   r24, r30
-        cpc  r25, r31
-        brsh 1f
-        movw r30, r24
-        rjmp 1f
-    2:  subi r24, lo8(-(%[early] + %[latest] - 20 * \joint))  ; a step that is too late is not made
-        sbci r25, hi8(-(%[early] + %[latest] - 20 * \joint))
-        brpl 3f
-        rjmp 75f
-    3:  sbi  \port, \bit
-        ldi  r24, 1 + \joint
-        or   r10, r24
-    1:
-        .endm
+        cbi  %[port2], %[bit2]
+        rjmp 2f
 
-        ; step JOINT, ...: counts the step that has risen, lets it fall, and places the next one
-        .macro finish joint port bit            ; a pulse that has risen and is not counted yet
-        sbis \port - 2, \bit
+        .global __vector_8              ; TIMER2_COMPB_vect
+        .type __vector_8, @function
+    __vector_8:
+        in   r2, %[sreg]
+        set
+        movw r4, r30
+        lds  r30, %[active] + %[stride]
+        lds  r31, %[active] + %[stride] + 1
+        lds  r3, %[left] + 1
+        sbis %[port3], %[bit3]
         rjmp 1f
-        lds  r24, %[joints] + 3 * \joint + 2
-        dec  r24
-        sts  %[joints] + 3 * \joint + 2, r24
-        cbi  \port, \bit
-    1:
-        .endm
-
-        .macro step joint port bit dir_port dir_bit
-        lds  r30, %[active] + 95 * \joint
-        lds  r31, %[active] + 95 * \joint + 1
-        lds  r24, %[joints] + 3 * \joint + 2
-        dec  r24
-        sts  %[joints] + 3 * \joint + 2, r24
-        breq 1f
-        ldd  r8, Z + %[interval]
-        ldd  r9, Z + %[interval] + 1
-        ldd  r10, Z + %[interval] + 2
-        ldd  r11, Z + %[interval] + 3
-        lds  r24, %[joints] + 3 * \joint       ; the next edge
-        lds  r25, %[joints] + 3 * \joint + 1
-        ldd  r3, Z + %[fraction]
-        add  r3, r8
+        cbi  %[port3], %[bit3]
+    2:  tst  r3
+        brne 20f
+        rjmp 5f
+    20: ldd  r6, Z + %[interval]
+        ldd  r7, Z + %[interval] + 1
+        ldd  r8, Z + %[interval] + 2
+        ldd  r9, Z + %[interval] + 3
+        ldd  r3, Z + %[fraction]        ; the next edge
+        add  r3, r6
         std  Z + %[fraction], r3
         ldd  r3, Z + %[fraction] + 1
-        adc  r3, r9
+        adc  r3, r7
         std  Z + %[fraction] + 1, r3
-        adc  r24, r10
-        adc  r25, r11
-        ldd  r3, Z + %[add]                    ; interval += add
-        add  r8, r3
-        std  Z + %[interval], r8
+        ldd  r10, Z + %[edge]
+        adc  r10, r8
+        std  Z + %[edge], r10
+        ldd  r11, Z + %[edge] + 1
+        adc  r11, r9
+        std  Z + %[edge] + 1, r11
+        ldd  r3, Z + %[add]             ; interval += add
+        add  r6, r3
+        std  Z + %[interval], r6
         ldd  r3, Z + %[add] + 1
-        adc  r9, r3
-        std  Z + %[interval] + 1, r9
+        adc  r7, r3
+        std  Z + %[interval] + 1, r7
         ldd  r3, Z + %[add] + 2
-        adc  r10, r3
-        std  Z + %[interval] + 2, r10
+        adc  r8, r3
+        std  Z + %[interval] + 2, r8
         ldd  r3, Z + %[add] + 3
-        adc  r11, r3
-        std  Z + %[interval] + 3, r11
-        cbi  \port, \bit                       ; fall
-        ldi  r30, lo8(%[step_margin])
-        ldi  r31, hi8(%[step_margin])
-        rjmp 3f
-
-    1:  ldd  r24, Z + %[next]                  ; the run is done
-        ldd  r25, Z + %[next] + 1
-        sts  %[active] + 95 * \joint, r24
-        sts  %[active] + 95 * \joint + 1, r25
-        movw r30, r24
-        ldd  r24, Z + %[steps]
-        sts  %[joints] + 3 * \joint + 2, r24
-        rjmp .+0
-        rjmp .+0
-        rjmp .+0
-        rjmp .+0
-        ldd  r24, Z + %[first]
-        ldd  r25, Z + %[first] + 1
-        ldd  r3, Z + %[chained]
-        rjmp .+0                               ; the pulse is long enough
-        rjmp .+0
-        rjmp .+0
-        cbi  \port, \bit                       ; fall
-        tst  r3
-        brne 2f
-        lds  r24, %[on]                        ; go idle
-        andi r24, 0xFF - (0x08 << \joint)
-        sts  %[on], r24
-        rjmp 4f
-    2:  ldd  r9, Z + %[dir_high]
-        ldi  r30, lo8(%[step_margin])
-        ldi  r31, hi8(%[step_margin])
-        sbrs r3, 1
-        rjmp 3f
-        sbrc r9, 0                             ; turn round
-        sbi  \dir_port, \dir_bit
-        sbrs r9, 0
-        cbi  \dir_port, \dir_bit
-        ldi  r30, lo8(%[dir_margin])
-        ldi  r31, hi8(%[dir_margin])
-    3:  sts  %[joints] + 3 * \joint, r24
-        sts  %[joints] + 3 * \joint + 1, r25
-        lds  r8, %[tccra] + 4                  ; late?
-        lds  r9, %[tccra] + 5
-        sub  r24, r8
-        sbc  r25, r9
-        sub  r24, r30
-        sbc  r25, r31
-        brpl 4f
-        rjmp 75f
-    4:
-        .endm
-
-        in   r2, %[sreg]
-        movw r4, r30
-        movw r6, r24
-    70: lds  r3, %[on]
-        tst  r3
-        brne 77f
-        rjmp 74f
-    77: clr  r10
-        ldi  r30, lo8(%[farthest])
-        ldi  r31, hi8(%[farthest])
-        lds  r8, %[tccra] + 4
-        lds  r9, %[tccra] + 5
-        look 0 %[port2] %[bit2]
-        look 1 %[port3] %[bit3]
-        tst  r10
-        brne 71f
-        subi r30, lo8(-(%[early] - %[look_ticks]))
-        sbci r31, hi8(-(%[early] - %[look_ticks]))
-        lsl  r30                               ; a 32nd of it in r31
+        adc  r9, r3
+        std  Z + %[interval] + 3, r9
+    3:  lds  r30, %[tccra] + 4          ; how far is it?
+        lds  r31, %[tccra] + 5
+        sub  r10, r30
+        sbc  r11, r31
+        movw r30, r10
+        subi r30, lo8(%[early])
+        sbci r31, hi8(%[early])
+    4:  sbiw r30, %[least]
+        brpl 6f
+    8:  ldi  r31, 0                     ; the nearest wake
+        rjmp 7f
+    6:  lsl  r30                        ; a 32nd of it in r31, modulo 256: an earlier wake looks again
         rol  r31
         lsl  r30
         rol  r31
         lsl  r30
         rol  r31
-        lds  r24, %[tccra] + 0x32
-        add  r31, r24
-        sts  %[tccra] + 0x33, r31
-    76: movw r24, r6
-        movw r30, r4
+    7:  lds  r30, %[tccra] + 0x32
+        subi r30, lo8(-(%[counts]))
+        add  r30, r31
+        brtc 9f
+        sts  %[tccra] + 0x34, r30
+        rjmp 10f
+    9:  sts  %[tccra] + 0x33, r30
+    10: movw r30, r4
         out  %[sreg], r2
         reti
 
-    71: bst  r10, 1
-        sbrs r10, 0
-        rjmp 72f
-        step 0 %[port2] %[bit2] %[dir_port2] %[dir_bit2]
-    72: brts 73f
-        rjmp 70b
-    73: step 1 %[port3] %[bit3] %[dir_port3] %[dir_bit3]
-        rjmp 70b
+    1:  ldd  r6, Z + %[edge]            ; is it due?
+        ldd  r7, Z + %[edge] + 1
+        lds  r30, %[tccra] + 4
+        lds  r31, %[tccra] + 5
+        sub  r6, r30
+        sbc  r7, r31
+        movw r30, r6
+        subi r30, lo8(%[early])
+        sbci r31, hi8(%[early])
+        brpl 4b
+        subi r30, lo8(-(%[early] + %[latest]))
+        sbci r31, hi8(-(%[early] + %[latest]))
+        brmi 11f
+        dec  r3                         ; rise, and count it
+        brts 12f
+        sbi  %[port2], %[bit2]
+        sts  %[left], r3
+        rjmp 8b
+    12: sbi  %[port3], %[bit3]
+        sts  %[left] + 1, r3
+        rjmp 8b
 
-    75: ldi  r24, 16                           ; a step is missed
-    78: dec  r24
-        brne 78b
-        finish 0 %[port2] %[bit2]
-        finish 1 %[port3] %[bit3]
-        lds  r24, %[timsk]
-        lds  r25, %[on]
-        or   r24, r25
-        sts  %[missed], r24
-        ldi  r24, %[all_disarmed]
-        sts  %[tccra], r24
-        ldi  r24, 1                            ; hal::ONLY_LAPS
-        sts  %[timsk], r24
-        ldi  r24, 0
-        sts  %[on], r24
-    74: ldi  r24, 0
-        sts  %[timsk] + 1, r24
-        rjmp 76b
-        .purgem look
-        .purgem step
-        .purgem finish
+    5:  ldd  r6, Z + %[next]            ; the run is done
+        ldd  r7, Z + %[next] + 1
+        movw r30, r6
+        ldd  r3, Z + %[steps]
+        brts 13f
+        sts  %[active], r6
+        sts  %[active] + 1, r7
+        sts  %[left], r3
+        rjmp 14f
+    13: sts  %[active] + %[stride], r6
+        sts  %[active] + %[stride] + 1, r7
+        sts  %[left] + 1, r3
+    14: ldd  r10, Z + %[edge]
+        ldd  r11, Z + %[edge] + 1
+        ldd  r3, Z + %[chained]
+        tst  r3
+        breq 17f
+        sbrs r3, 1
+        rjmp 3b
+        ldd  r3, Z + %[dir_high]        ; turn round
+        brts 15f
+        sbrc r3, 0
+        sbi  %[dir_port2], %[dir_bit2]
+        sbrs r3, 0
+        cbi  %[dir_port2], %[dir_bit2]
+        rjmp 16f
+    15: sbrc r3, 0
+        sbi  %[dir_port3], %[dir_bit3]
+        sbrs r3, 0
+        cbi  %[dir_port3], %[dir_bit3]
+    16: movw r30, r10                   ; late?
+        lds  r8, %[tccra] + 4
+        lds  r9, %[tccra] + 5
+        sub  r30, r8
+        sbc  r31, r9
+        subi r30, lo8(%[dir_margin])
+        sbci r31, hi8(%[dir_margin])
+        brmi 11f
+        rjmp 3b
+    11: jmp  missed_step
+
+    17: lds  r30, %[timsk2]             ; go idle
+        brts 18f
+        andi r30, %[only3]
+    18: brtc 19f
+        andi r30, %[only2]
+    19: sts  %[timsk2], r30
+        rjmp 10b
         )" ::[sreg] "I"(_SFR_IO_ADDR(SREG)),
-        [on] "i"(&hal::scheduled_on), [joints] "i"(&hal::scheduled[0]), [active] "i"(&step_joints[2].active),
-        [early] "i"(SCHEDULED_EARLY_TICKS), [look_ticks] "i"(LOOK_TICKS), [farthest] "i"(FARTHEST_TICKS),
-        [latest] "i"(LATEST_TICKS), [interval] "I"(offsetof(Run, interval_q16)),
-        [add] "I"(offsetof(Run, add_q16)), [next] "I"(offsetof(Run, next)), [steps] "I"(offsetof(Run, steps)),
-        [fraction] "I"(offsetof(Run, fraction)), [first] "I"(offsetof(Run, first_ticks)),
-        [chained] "I"(offsetof(Run, chained)), [dir_high] "I"(offsetof(Run, dir_high)),
-        [step_margin] "i"(engine::STEP_MARGIN_TICKS + SCHEDULED_EARLY_TICKS),
+        [active] "i"(&step_joints[2].active), [stride] "i"(sizeof(planarm::StepJoint)),
+        [left] "i"(&hal::scheduled_left[0]), [early] "i"(SCHEDULED_EARLY_TICKS), [latest] "i"(LATEST_TICKS),
+        [least] "I"(LEAST_TICKS), [counts] "i"(hal::WAKE_COUNTS), [interval] "I"(offsetof(Run, interval_q16)),
+        [add] "I"(offsetof(Run, add_q16)), [fraction] "I"(offsetof(Run, fraction)),
+        [edge] "I"(offsetof(Run, first_ticks)), [next] "I"(offsetof(Run, next)),
+        [steps] "I"(offsetof(Run, steps)), [chained] "I"(offsetof(Run, chained)),
+        [dir_high] "I"(offsetof(Run, dir_high)),
         [dir_margin] "i"(engine::DIR_MARGIN_TICKS + SCHEDULED_EARLY_TICKS), [tccra] "i"(&TCCR1A),
-        [timsk] "i"(&TIMSK1), [missed] "i"(&step_missed), [all_disarmed] "i"(hal::ALL_DISARMED),
+        [timsk2] "i"(&TIMSK2), [only2] "M"(_BV(OCIE2A)), [only3] "M"(_BV(OCIE2B)),
         [port2] "I"(port_of(wire::STEP_PINS[2])), [bit2] "I"(hal::bit_of(wire::STEP_PINS[2])),
         [port3] "I"(port_of(wire::STEP_PINS[3])), [bit3] "I"(hal::bit_of(wire::STEP_PINS[3])),
         [dir_port2] "I"(port_of(wire::DIR_PINS[2])), [dir_bit2] "I"(hal::bit_of(wire::DIR_PINS[2])),
