@@ -18,6 +18,7 @@ from planarm_sim.cpu import registers as reg
 from planarm_sim.cpu.values import ResetCause
 from planarm_wire.codec import encoded_bytes
 from planarm_wire.messages import (
+    BOARDS,
     EMERGENCY_CODE,
     EMERGENCY_REPEATS,
     ENABLE_PIN,
@@ -44,6 +45,7 @@ BYTE_CYCLES = 640
 IMAGE = Path(__file__).parents[2] / "firmware" / "release" / "uno.hex"
 WRITE_CYCLES = 54_400  # 3.4 ms a byte
 MARK_CYCLES = 4 * WRITE_CYCLES
+WDIE, WDE, WDP2 = 1 << 6, 1 << 3, 1 << 2  # WDTCSR
 JUMP_TO_ITSELF = b"\xff\xcf"  # rjmp .-2
 RECORD_BYTES, RECORDS = 4, 128
 CELL_WRITES = 100_000  # ATmega328P datasheet, 8.1
@@ -174,6 +176,30 @@ def test_a_main_program_that_stands_still_is_reset(
     assert (welcome.reset_cause, welcome.interrupted) == (told, 1)
     status = board.ask()
     assert (status.state, status.ledger.position_usteps, status.ledger.executed_segments) == (State.IDLE, (0, 0), 0)
+
+
+@pytest.mark.parametrize("board", BOARDS)
+@pytest.mark.parametrize("cause", [ResetCause.POWER_ON, ResetCause.EXTERNAL, ResetCause.WATCHDOG])
+def test_the_watchdog_is_on_from_start_up_on(board: str, cause: ResetCause) -> None:
+    # Within 5 us of the reset, before memory is set up. All of start-up, 17 ms with the journal, fits in its 250 ms.
+    firmware = EmulatedFirmware(IMAGE.with_name(f"{board}.hex"), BOARDS[board])
+    uno, chip = firmware.uno, firmware.uno._chip
+    uno.reset(cause)
+    uno.run(cycles=80)
+    for _ in range(BOOT_CYCLES // 2000):
+        assert chip._state[reg.WDTCSR] == WDIE | WDE | WDP2
+        uno.run(cycles=2000)
+
+
+@pytest.mark.parametrize("after_cycles", [5_000, 100_000, 250_000], ids=["memory", "journal read", "journal written"])
+def test_a_start_up_that_stands_still_is_reset(emulated_firmware: EmulatedFirmware, after_cycles: int) -> None:
+    board = Board(emulated_firmware)
+    emulated_firmware.uno.reset(ResetCause.EXTERNAL)
+    board.run(after_cycles)
+    stand_still(emulated_firmware, interrupts=False)
+    board.run(2 * WATCHDOG_MS * TICKS_HZ // 1000 + BOOT_CYCLES)
+    board.forget_replies()
+    assert board.hello().reset_cause is Reset.WATCHDOG
 
 
 def test_a_watchdog_reset_is_told_once(emulated_firmware: EmulatedFirmware) -> None:

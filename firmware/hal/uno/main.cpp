@@ -2,6 +2,7 @@
 
 #include <avr/interrupt.h>
 #include <avr/io.h>
+#include <avr/wdt.h>
 
 #include "firmware.h"
 #include "hal_serial.h"
@@ -41,9 +42,10 @@ constexpr uint8_t PULL_UPS_D = pull_ups_in(hal::Port::D);
 }  // namespace
 
 // Runs before main and before memory is set up: drivers released (ENABLE at its level before it becomes an
-// output), STEP and DIR low, pull-ups on the inputs, no watchdog left over from before the reset (ATmega328P
-// datasheet, 10.9.2). A reset in the middle of a write to the EEPROM leaves open whether that goes on
-// (7.6.3).
+// output), STEP and DIR low, pull-ups on the inputs. The watchdog, which after its own reset runs on with 16
+// ms (ATmega328P datasheet, 10.9.2), gets 250 ms twice: interrupt, then reset (10.8.2). A main program that
+// goes on within the second leaves its mark: whatever resets the chip next is told as the watchdog, which had
+// come. A reset in the middle of a write to the EEPROM leaves open whether that goes on (7.6.3).
 extern "C" void early_pins() __attribute__((naked, used, section(".init3")));
 void early_pins() {
     while ((EECR & _BV(EEPE)) != 0) {
@@ -58,8 +60,10 @@ void early_pins() {
     PORTC = PULL_UPS_C;
     reset_flags = MCUSR;
     MCUSR = 0;
+    static_assert(wire::WATCHDOG_MS == 250, "WDP2 alone");
+    wdt_reset();
     WDTCSR = _BV(WDCE) | _BV(WDE);
-    WDTCSR = 0;
+    WDTCSR = _BV(WDIE) | _BV(WDE) | _BV(WDP2);
 }
 
 namespace {
@@ -71,7 +75,6 @@ namespace {
     hal::step_timer_init();
     planarm::firmware::set_up({journal.count, cause, journal.was_enabled}, 0);
     hal::serial_init();
-    hal::watchdog_start();
 }
 
 }  // namespace

@@ -35,15 +35,6 @@ Reset find_reset_cause() {
     return left == RUNNING ? Reset::UNKNOWN : Reset::POWER_ON;
 }
 
-// 250 ms twice: interrupt, then reset (ATmega328P datasheet, 10.8.2). A main program that goes on within the
-// second leaves its mark: whatever resets the chip next is told as the watchdog, which had come.
-void watchdog_start() {
-    static_assert(planarm::wire::WATCHDOG_MS == 250, "the prescaler below");
-    wdt_reset();
-    WDTCSR = _BV(WDCE) | _BV(WDE);
-    WDTCSR = _BV(WDIE) | _BV(WDE) | _BV(WDP2);
-}
-
 void watchdog_feed() { wdt_reset(); }
 
 }  // namespace hal

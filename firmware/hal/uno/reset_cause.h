@@ -9,7 +9,4 @@ namespace hal {
 // For start-up, once: also leaves the trace for the next start.
 planarm::wire::Reset find_reset_cause();
 
-// Watchdog: an interrupt after 250 ms leaves its trace, a reset follows 250 ms later.
-void watchdog_start();
-
 }  // namespace hal
