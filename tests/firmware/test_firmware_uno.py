@@ -46,6 +46,9 @@ from planarm_wire.messages import (
 
 IMAGE = Path(__file__).parents[2] / "firmware" / "release" / "uno.hex"
 RESET_TO_PINS_CYCLES = 32  # 2 us, with a look at the EEPROM for ENABLE's polarity
+# Before a pulse ends there may run what is left of a receive interrupt (39), a lock of the main program (11), the other
+# joint's interrupt (77) and the one instruction between two (2); it ends after 56 itself.
+MOST_HIGH_TICKS = 185
 BOOT_CYCLES = 600_000
 POLARITY_ADDRESS, ACTIVE_HIGH = 1023, 0x01  # firmware/hal/uno/polarity.h
 
@@ -157,6 +160,7 @@ def assert_every_edge(board: Board, motion: list[Segment], status: Status) -> No
         highs = [fall.tick - rise.tick for rise, fall in zip(edges[::2], edges[1::2], strict=True)]
         lows = [rise.tick - fall.tick for fall, rise in zip(edges[1::2], edges[2::2], strict=False)]
         assert min(highs) >= MIN_STEP_HIGH_TICKS
+        assert max(highs) <= MOST_HIGH_TICKS, f"joint {joint + 1}: {max(highs)}"
         assert min(lows) >= MIN_STEP_LOW_TICKS
     assert status.ledger.position_usteps == schedule.positions()
 
