@@ -6,12 +6,15 @@ import math
 import random
 from fractions import Fraction
 
-from firmware_board import segment_of
+from firmware_board import end_motion, segment_of
 from planarm_wire.messages import (
+    BOARDS,
     MAX_COARSE_STEPS,
     MAX_INTERVAL_TICKS,
     MIN_DIR_SETUP_TICKS,
     MIN_INTERVAL_TICKS,
+    SLICE_TICKS,
+    TICKS_HZ,
     Move,
     Segment,
 )
@@ -41,6 +44,24 @@ def fast(interval: int, ratio: float, duration: int, count: int) -> list[Segment
         )
         segments.append(segment_of(duration, *moves))
     return segments
+
+
+def steady(name: str, interval: int, seconds: float, duration: int = 8 * SLICE_TICKS) -> list[Segment]:
+    """All joints at nearly one interval, each a little slower than the one before it, so that all phases occur."""
+    joints = BOARDS[name].joints
+    intervals = [round(256 * interval * ratio) for ratio in (1.0, 1.0037, 1.0071, 1.0113)[:joints]]
+    begun_at = [Fraction(7 * joint) for joint in range(joints)]
+    segments = []
+    for _ in range(math.ceil(seconds * TICKS_HZ / duration)):
+        moves, begun_at = zip(
+            *(
+                fast_moves(duration, Fraction(math.ceil(at)), each)
+                for at, each in zip(begun_at, intervals, strict=True)
+            ),
+            strict=True,
+        )
+        segments.append(segment_of(duration, *moves, joints=joints))
+    return end_motion(segments)
 
 
 class RestlessJoint:

@@ -6,13 +6,15 @@ tick. The model works in rational numbers and floats, the firmware in integers o
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import NamedTuple
 
 from firmware_board import end_motion
-from planarm_wire.messages import MAX_COARSE_STEPS, TICKS_HZ, Move, Segment
+from planarm_wire.messages import MAX_COARSE_STEPS, SLICE_TICKS, TICKS_HZ, Move, Segment
 from planarm_wire.rates import need_code, rate_code, rate_value
 from planarm_wire.steps import add_q16, duration_ticks, move_of, step_ticks
 
@@ -130,7 +132,7 @@ def sped_up(stretch: int, rate: int, path_ticks: int = SEGMENT_TICKS, target: in
     """The least stretch that three turns of Newton's method from above find for s1 + rate D s1^3 = s0, in 2^-16."""
     end = stretch
     for _ in range(3):
-        relative = min(min(rate * path_ticks, 2**32 - 1) * min(end * end >> 16, 2**32 - 1) >> 32, 8 * ONE)
+        relative = min(min(rate * path_ticks, 2**32 - 1) * min(end * end >> 16, 2**32 - 1) >> 32, ONE)
         above = (end * relative >> 16) - (stretch - end)
         if above <= 0:
             break
@@ -143,38 +145,62 @@ def mapped(path: float, path_ticks: int, s0: int, s1: int) -> float:
     return path * (s0 + (s1 - s0) * path / (2 * path_ticks)) / ONE
 
 
-def stretches_of(
+class StretchedSlice(NamedTuple):
+    """A slice of a segment: path times, and the stretch at both ends."""
+
+    segment: int
+    path_start: int
+    path_ticks: int
+    s0: int
+    s1: int
+
+
+def stretched_slices(
     motion: HoldableMotion, hold: int | None = None, rest: int | None = None, target: int = ONE
-) -> list[int]:
-    """The stretch at the ends of all slices, when a hold slows down from slice `hold` on and the clock rests in `rest`.
+) -> list[StretchedSlice]:
+    """All slices, when a hold slows down from segment `hold` on and the clock rests in slice `rest`.
 
-    Gentle changes use half of the allowance. Without a hold the stretch goes to `target` from the start.
+    Gentle changes use half of the allowance. Without a hold the stretch goes to `target` from the start. With each
+    doubling of the stretch slices are half as long. The last two of a segment are alike; stretched, the last may be twice
+    as long.
     """
-    stretches = [ONE if hold is not None else target]
-    for k, (slow, fast, _) in enumerate(motion.heads):
-        now = stretches[-1]
-        if hold is not None and k >= hold and (rest is None or k <= rest):
-            stretches.append(slowed(now, rate_value(slow) >> 1))
-        elif now > target:
-            stretches.append(sped_up(now, rate_value(fast) >> 1, target=target))
-        else:
-            stretches.append(now)
-    return stretches
+    slices: list[StretchedSlice] = []
+    stretch, path = ONE if hold is not None else target, 0
+    for k, (segment, (slow, fast, _)) in enumerate(zip(motion.segments, motion.heads, strict=True)):
+        left = duration_ticks(segment)
+        while left:
+            most = SLICE_TICKS >> (stretch // ONE).bit_length() - 1
+            if most < SLICE_TICKS:
+                length = left if left < 2 * most else most
+            else:
+                length = left if left <= most else min(most, (left + 1) // 2)
+            end = stretch
+            if hold is not None and k >= hold and (rest is None or len(slices) <= rest):
+                end = slowed(stretch, rate_value(slow) >> 1, length)
+            elif stretch > target:
+                end = sped_up(stretch, rate_value(fast) >> 1, length, target)
+            slices.append(StretchedSlice(k, path, length, stretch, end))
+            stretch, path, left = end, path + length, left - length
+    return slices
 
 
-def stretched_steps(segments: Sequence[Segment], stretches: Sequence[int], joint: int) -> list[float]:
-    """The ticks of a joint's steps from the motion's start, when segment k goes from stretch k to stretch k + 1."""
+def stretched_steps(segments: Sequence[Segment], slices: Sequence[StretchedSlice], joint: int) -> list[float]:
+    """The ticks of a joint's steps from the motion's start."""
+    paths = []
+    begin = 0
+    for segment in segments:
+        paths += [begin + tick for tick in step_ticks(segment.moves[joint])]
+        begin += duration_ticks(segment)
     found: list[float] = []
     start = 0
-    for k, segment in enumerate(segments):
-        length = duration_ticks(segment)
-        s0, s1 = stretches[k], stretches[k + 1]
-        found += [start + mapped(tick, length, s0, s1) for tick in step_ticks(segment.moves[joint])]
-        start += length * ((s0 + s1) // 2) >> 16
+    for one in slices:
+        while len(found) < len(paths) and paths[len(found)] < one.path_start + one.path_ticks:
+            found.append(start + mapped(paths[len(found)] - one.path_start, one.path_ticks, one.s0, one.s1))
+        start += one.path_ticks * ((one.s0 + one.s1) // 2) >> 16
     return found
 
 
-def largest_accelerations(motion: HoldableMotion, stretches: Sequence[int]) -> list[float]:
+def largest_accelerations(motion: HoldableMotion, slices: Sequence[StretchedSlice]) -> list[float]:
     """Each joint's largest acceleration on the stretched path, as a share of its limit.
 
     With speed q' and acceleration q'' along the path, rate u = 1 / s: q'' u^2 + q' u', u' = -(s1 - s0) / (D s^3).
@@ -182,18 +208,18 @@ def largest_accelerations(motion: HoldableMotion, stretches: Sequence[int]) -> l
     found = []
     for joint, limit in enumerate(motion.acceleration):
         worst = 0.0
-        for k, segment in enumerate(motion.segments):
-            move = segment.moves[joint]
+        for one in slices:
+            move = motion.segments[one.segment].moves[joint]
             if move.steps_dir < 6:
                 continue
             count = move.steps_dir >> 1
             intervals = [(256 * move.interval_q8 + i * add_q16(move)) / ONE for i in (0, count - 2)]
             speeds = [1 / interval for interval in intervals]
             bend = (speeds[1] - speeds[0]) / (step_ticks(move)[-1] - step_ticks(move)[0])
-            s0, s1 = stretches[k] / ONE, stretches[k + 1] / ONE
-            for speed, s in zip(speeds, (s0, s1), strict=True):
+            s0, s1 = one.s0 / ONE, one.s1 / ONE
+            for speed, s in itertools.product(speeds, (s0, s1)):
                 if speed / s > 1 / motion.start_stop_ticks[joint]:
-                    change = -(s1 - s0) / (SEGMENT_TICKS * s**3)
+                    change = -(s1 - s0) / (one.path_ticks * s**3)
                     worst = max(worst, abs(bend / s**2 + speed * change))
         found.append(worst / limit)
     return found

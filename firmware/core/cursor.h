@@ -28,6 +28,9 @@ class Cursor {
     // it is close enough to the step before for the step interrupt to go on by itself.
     bool take(const path_clock::Slice& slice, Run& run);
 
+    // The next slice is not as long as the one before.
+    void forget_guess() { guess_ = 0; }
+
     // Nothing is left in the slice: another one follows.
     void finish(const path_clock::Slice& slice);
 

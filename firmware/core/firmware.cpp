@@ -171,8 +171,8 @@ void pass() {
     clock::begin_pass();
     serve_emergency();  // before the motion wonders where its interrupts are
     serve_motion();
-    if (motion::is_urgent()) return;
     serve_hold();
+    if (motion::is_urgent()) return;
     serve_rest();
     hal::journal_serve();
     // An emergency that comes just now is told by the next STATUS: this one has neither fault nor the last

@@ -81,9 +81,9 @@ constexpr uint16_t MIN_SLOW_INTERVAL_TICKS = 32768U;
 constexpr uint32_t MAX_SLOW_INTERVAL_TICKS = 16777215UL;
 // A move of so many steps or fewer tells its add in 2^-8 ticks; a slow move has no more.
 constexpr uint8_t MAX_COARSE_STEPS = 128;
-// The device cuts segments into equal slices of at most 3.6 ms, the last shorter by the rounding up
-// of the others. One run of a joint fills a slice at its least interval. The path clock's rate
-// changes from slice to slice.
+// The device cuts segments into slices of 3.6 ms, with each doubling of the stretch half as long,
+// the last up to twice as long; at the planned pace the last two of a segment are alike. One run of
+// a joint fills a slice at its least interval. The path clock's rate changes from slice to slice.
 constexpr uint16_t SLICE_TICKS = 57000U;
 // Longest segment, about 67 s.
 constexpr uint32_t MAX_SEGMENT_TICKS = 1073741823UL;

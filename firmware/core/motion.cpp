@@ -26,9 +26,9 @@ constexpr int32_t PREPARE_AHEAD_TICKS = wire::MIN_LEAD_TICKS;
 // Segments must have come this long before they start: 2.5 ms.
 constexpr int32_t LATEST_ARRIVAL_TICKS = 40000;
 
-// After a rest on the path the joints start so long after they are told to at the earliest: their DIR pins
-// are set by then.
-constexpr uint32_t THAW_LEAD_TICKS = 16000;
+// After a rest on the path the joints start so long after they are told to: the slice in which the clock
+// stood may be about to end, and the next one is prepared by then, and DIR pins are set.
+constexpr uint32_t THAW_LEAD_TICKS = wire::MIN_LEAD_TICKS;
 
 // A payload that still fits means that more can come.
 constexpr uint16_t FULL_BYTES = wire::MAX_PAYLOAD_BYTES;
@@ -63,7 +63,7 @@ class Motion {
     void set_override(uint8_t to_percent);
     uint8_t override_percent() const { return percent; }
     uint8_t rate_percent() const;
-    bool is_urgent() const { return running && !frozen && filling && urgent; }
+    bool is_urgent() const { return running && !frozen && urgent; }
     Progress serve();
     void halt();
     uint32_t tell_ledger(wire::Ledger& ledger) const;
@@ -100,7 +100,6 @@ class Motion {
 
     bool segment_last;
     uint32_t left_ticks;   // of the segment, in no slice yet
-    uint16_t slice_ticks;  // of its slices but the last
 
     bool filling;  // a slice
     bool urgent;   // the last call of serve handed something over
@@ -145,15 +144,29 @@ bool Motion::is_starving(uint8_t margin) const {
         reading = false;
     }
     left_ticks = head.duration_ticks;
-    const uint32_t slices = (left_ticks - 1) / wire::SLICE_TICKS + 1;
-    slice_ticks = static_cast<uint16_t>((left_ticks - 1) / slices + 1);
     segment_last = head.last;
     intake::begin_segment(left_ticks);
 }
 
+// A slice is half as long with each doubling of the stretch, so that the clock comes to rest, and goes on, as
+// soon as the rates let it. Short ones take the main program as long as others: the last two of a segment are
+// alike, while the clock is stretched the last one may be up to twice as long.
+uint32_t next_slice_ticks(uint32_t left_ticks, const Slice& before) {
+    uint32_t ticks = wire::SLICE_TICKS;
+    uint16_t stretch = static_cast<uint16_t>(before.end_stretch() >> 16);
+    if (left_ticks <= ticks && stretch < 2) return left_ticks;
+    if (stretch < 2) return least_of(ticks, (left_ticks + 1) >> 1);
+    while ((stretch >>= 1) != 0) ticks >>= 1;
+    return left_ticks < 2 * ticks ? left_ticks : ticks;
+}
+
 [[gnu::noinline]] void Motion::open_slice() {
     path_clock::Way& way = slice.way();
-    way.path_ticks = static_cast<uint16_t>(least_of(left_ticks, slice_ticks));
+    const uint16_t ticks = static_cast<uint16_t>(next_slice_ticks(left_ticks, slice));
+    if (ticks != way.path_ticks) {
+        for (Cursor& cursor : cursors) cursor.forget_guess();
+    }
+    way.path_ticks = ticks;
     way.ends_segment = left_ticks == way.path_ticks;
     left_ticks -= way.path_ticks;
     way.target = override_stretch;
@@ -192,17 +205,24 @@ bool Motion::is_starving(uint8_t margin) const {
     return true;
 }
 
+// A stretched slice takes much longer than a plain one: each pass that does something for it leaves the line
+// to a later one.
 void Motion::prepare() {
+    const bool stretched = !slice.is_plain();
     urgent = false;
     if (!filling) {
-        if (left_ticks == 0) read_next_segment();  // as a rule ahead of time
-        if (left_ticks == 0) return;
+        if (left_ticks == 0) {  // as a rule ahead of time
+            read_next_segment();
+            urgent = stretched && left_ticks != 0;
+            if (left_ticks == 0 || urgent) return;
+        }
         const int32_t away_ticks = clock::ticks_until(slice.end_ticks());
         if (prepared_count == MAX_SLICES || away_ticks > PREPARE_AHEAD_TICKS) return;
         open_slice();
         urgent = !slice.is_plain();  // else there is time for a run, too
     }
     filling = !fill_slice();
+    urgent = urgent && (filling || stretched);
 }
 
 // Takes executed slices off the list. When the last of them ended what was received, so does the motion.

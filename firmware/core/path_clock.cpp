@@ -5,16 +5,15 @@ namespace path_clock {
 
 namespace {
 
-// The change of a slice that is stretched by `stretch` where it changes most, in relation to that, and at
-// most `most`: rate x path x stretch^2, in 2^-16.
-uint32_t relative_change(uint32_t rate_path, uint32_t stretch, uint8_t most) {
-    const uint32_t relative = multiply_q32(rate_path, multiply_q16(stretch, stretch));
-    return least_of(relative, most * ONE);
+// The change of a slice that is stretched by `stretch` where it changes most, in relation to that: rate x
+// path x stretch^2, in 2^-16. At most 1: so a quadratic in the number of steps stays a good likeness, and no
+// slice takes much less time than the main program takes for the next one.
+uint32_t relative_change(uint32_t rate_path, uint32_t stretch) {
+    return least_of(multiply_q32(rate_path, multiply_q16(stretch, stretch)), ONE);
 }
 
-// At most twice the stretch, so that a quadratic in the number of steps stays a good likeness.
 uint32_t slowed(uint32_t stretch, uint32_t rate_path) {
-    return stretch + multiply_q16(stretch, relative_change(rate_path, stretch, 1));
+    return stretch + multiply_q16(stretch, relative_change(rate_path, stretch));
 }
 
 // The root of s + F D s^3 = s0 by Newton's method from above: it comes down to the root and does not pass it
@@ -23,7 +22,7 @@ uint32_t slowed(uint32_t stretch, uint32_t rate_path) {
 uint32_t sped_up(uint32_t stretch, uint32_t rate_path) {
     uint32_t end = stretch;
     for (uint8_t turn = 0; turn < 3; ++turn) {
-        const uint32_t relative = relative_change(rate_path, end, 8);
+        const uint32_t relative = relative_change(rate_path, end);
         const uint32_t growth = multiply_q16(end, relative);
         const uint32_t gap = stretch - end;
         if (growth <= gap) break;
@@ -61,22 +60,20 @@ void Slice::follow() {
     if (s1_ != way_.target) s1_ = stretch_after(s1_, way_);
     plain_ = (s0_ | s1_) == ONE;  // neither is less
     increase(end_ticks_, multiply_high((s0_ + s1_) >> 1, way_.path_ticks));
-    if (s0_ != s1_) reciprocal_ = 0xFFFFFFFF / way_.path_ticks;
+    falls_ = s1_ < s0_;
+    range_ = falls_ ? s0_ - s1_ : s1_ - s0_;
+    if (range_ == 0 || way_.path_ticks == divided_ticks_) return;
+    divided_ticks_ = way_.path_ticks;
+    reciprocal_ = 0xFFFFFFFF / divided_ticks_;
 }
 
 // From the lesser end up, whichever that is: never below a stretch of 1, where steps would come closer than
 // the least interval, whose ticks the step interrupt needs all.
 uint32_t Slice::stretch_at(uint16_t path) const {
-    if (s0_ == s1_) return s0_;
+    if (range_ == 0) return s0_;
     uint16_t share = static_cast<uint16_t>(multiply_high(reciprocal_, path));  // of the slice, in 2^-16
-    uint32_t range = s1_ - s0_;
-    uint32_t least = s0_;
-    if (s1_ < least) {
-        least = s1_;
-        range = 0 - range;
-        share = static_cast<uint16_t>(~share);
-    }
-    return multiply_high(range, share) + least;
+    if (falls_) share = static_cast<uint16_t>(~share);
+    return multiply_high(range_, share) + (falls_ ? s1_ : s0_);
 }
 
 uint32_t Slice::ticks_at(uint16_t path) const {

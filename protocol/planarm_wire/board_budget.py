@@ -41,6 +41,14 @@ STRETCHED_JOINT_TICKS: Final = 8_500
 """What a board needs more for a segment that is stretched, for each joint of its image: with those of 0.5 and 1 ms uno
 keeps up at one every 2.0 ms; uno_four at one every 2.5 ms with two joints moving, 3.4 ms with three, 4.2 ms with four.
 """
+SLOWED_TICKS: Final = 3_100
+SLOWED_JOINT_TICKS: Final = 5_200
+"""The main program's work on a slice of the path that is slowed down, and on each joint that moves in it: cycles of
+`Motion::open_slice`, of `Cursor::take` (3,900 to 4,300 on average) and of the passes that they come in."""
+MOST_SLOWED_TICKS: Final = 41_000
+"""In that time a slowed slice must be prepared: MIN_LEAD_TICKS less what one pass that looks at the line may take.
+Measured on the emulator (docs/decisions/0133): two joints at 265 ticks, or four at 1,600, hold in every phase on a
+line that is full of queries or of repeated segments; at 255 and 1,300 they do not."""
 LATEST_READ_TICKS: Final = 40_000
 """How long before its start a segment must be there."""
 LEAST_SHARE: Final = 0.05

@@ -87,7 +87,7 @@ MAX_SLOW_INTERVAL_TICKS: Final = 16_777_215
 MAX_COARSE_STEPS: Final = 128
 """A move of so many steps or fewer tells its add in 2^-8 ticks; a slow move has no more."""
 SLICE_TICKS: Final = 57_000
-"""The device cuts segments into equal slices of at most 3.6 ms, the last shorter by the rounding up of the others.
+"""The device cuts segments into slices of 3.6 ms, with each doubling of the stretch half as long, the last up to twice as long; at the planned pace the last two of a segment are alike.
 
 One run of a joint fills a slice at its least interval. The path clock's rate changes from slice to slice.
 """

@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import itertools
-import math
 import random
 from collections.abc import Callable
-from fractions import Fraction
 from pathlib import Path
 
 import pytest
@@ -22,7 +20,7 @@ from firmware_board import (
     run_of,
     segment_of,
 )
-from firmware_motions import fast_moves
+from firmware_motions import steady
 from firmware_tracer import STEP_1, STEP_2, Tracer
 from planarm_sim.cpu import registers as reg
 from planarm_wire.codec import encode
@@ -112,24 +110,6 @@ class Scheduled(EmulatedFirmware):
 
 def emulated(name: str) -> Scheduled:
     return Scheduled(RELEASE / f"{name}.hex", BOARDS[name])
-
-
-def steady(name: str, interval: int, seconds: float, duration: int = 8 * SLICE_TICKS) -> list[Segment]:
-    """All joints at nearly one interval, each a little slower than the one before it, so that all phases occur."""
-    joints = BOARDS[name].joints
-    intervals = [round(256 * interval * ratio) for ratio in (1.0, 1.0037, 1.0071, 1.0113)[:joints]]
-    begun_at = [Fraction(7 * joint) for joint in range(joints)]
-    segments = []
-    for _ in range(math.ceil(seconds * TICKS_HZ / duration)):
-        moves, begun_at = zip(
-            *(
-                fast_moves(duration, Fraction(math.ceil(at)), each)
-                for at, each in zip(begun_at, intervals, strict=True)
-            ),
-            strict=True,
-        )
-        segments.append(segment_of(duration, *moves, joints=joints))
-    return end_motion(segments)
 
 
 def restless(name: str, seed: int, count: int) -> list[Segment]:

@@ -27,7 +27,7 @@ CYCLES = {
     "multiply_q16": (165, 169),
     "multiply_q32": (165, 169),
     "add_to": (39, 39),
-    "divide_q16": (685, 717),
+    "divide_q16": (91, 700),
 }
 
 

@@ -56,8 +56,8 @@ from stretch_motion import (
     HoldableMotion,
     Profile,
     largest_accelerations,
+    stretched_slices,
     stretched_steps,
-    stretches_of,
 )
 
 UNEQUAL = Profile((20_000.0, 12_361.0 / 9), (400_000.0, 30_000.0), 0.8, 30).motion()
@@ -85,15 +85,15 @@ def held_at(player: Player, hold_tick: int) -> tuple[int, list[int]]:
     made = [len(player.board.rises(joint)) for joint in range(JOINTS)]
     earliest = max(0, (hold_tick - begin) // SEGMENT_TICKS)
     for k in range(earliest, earliest + 4):
-        stretches = stretches_of(player.motion, hold=k)
+        slices = stretched_slices(player.motion, hold=k)
         try:
             for joint in range(JOINTS):
-                predicted = stretched_steps(player.motion.segments, stretches, joint)[: made[joint]]
+                predicted = stretched_steps(player.motion.segments, slices, joint)[: made[joint]]
                 assert_predicted([tick - begin for tick in player.board.rises(joint)], predicted)
         except AssertionError:
             continue
         assert begin + k * SEGMENT_TICKS - hold_tick <= HOLD_LATENCY_TICKS
-        assert max(largest_accelerations(player.motion, stretches[: len(stretches)])) <= 1.02
+        assert max(largest_accelerations(player.motion, slices)) <= 1.02
         return k, made
     raise AssertionError(f"no slice from {earliest} on explains the edges")
 
@@ -122,9 +122,9 @@ def assert_resumed_as_predicted(player: Player, hold: int, made: list[int]) -> N
     """After a rest in some slice the edges are those of the model, all later by the same time."""
     begin = begin_of(player)
     causes = []
-    for rest in range(hold, len(player.motion.segments)):
-        stretches = stretches_of(player.motion, hold=hold, rest=rest)
-        predicted = [stretched_steps(player.motion.segments, stretches, joint) for joint in range(JOINTS)]
+    for rest in range(hold, len(stretched_slices(player.motion, hold=hold))):
+        slices = stretched_slices(player.motion, hold=hold, rest=rest)
+        predicted = [stretched_steps(player.motion.segments, slices, joint) for joint in range(JOINTS)]
         moving = [joint for joint in range(JOINTS) if made[joint] < len(predicted[joint])]
         later = {j: player.board.rises(j)[made[j]] - begin - predicted[j][made[j]] for j in moving}
         try:
@@ -136,7 +136,7 @@ def assert_resumed_as_predicted(player: Player, hold: int, made: list[int]) -> N
         except AssertionError as cause:
             causes.append(str(cause))
             continue
-        assert max(largest_accelerations(player.motion, stretches)) <= 1.02
+        assert max(largest_accelerations(player.motion, slices)) <= 1.02
         return
     raise AssertionError(f"no rest explains the edges: {causes[:3]}")
 
@@ -181,8 +181,8 @@ def test_override_from_the_start(native_firmware: NativeFirmware, motion: Holdab
     player.start()
     player.assert_all_steps_made()
     stretch = 100 * ONE // percent
-    stretches = stretches_of(motion, target=stretch)
-    predicted = [stretched_steps(motion.segments, stretches, joint) for joint in range(JOINTS)]
+    slices = stretched_slices(motion, target=stretch)
+    predicted = [stretched_steps(motion.segments, slices, joint) for joint in range(JOINTS)]
     begin = round(player.board.rises(0)[0] - predicted[0][0])
     for joint in range(JOINTS):
         assert_predicted([tick - begin for tick in player.board.rises(joint)], predicted[joint])
@@ -206,11 +206,11 @@ def test_slow_moves_under_an_override(native_firmware: NativeFirmware, percent: 
     player.board.ask(Override(percent))
     player.start()
     player.assert_all_steps_made()
-    stretches = stretches_of(motion, target=100 * ONE // percent)
+    slices = stretched_slices(motion, target=100 * ONE // percent)
     for joint in range(JOINTS):
-        predicted = stretched_steps(motion.segments, stretches, joint)
+        predicted = stretched_steps(motion.segments, slices, joint)
         # A slice's length in ticks is rounded down, some ten a segment.
-        begin = round(player.board.rises(0)[0] - stretched_steps(motion.segments, stretches, 0)[0])
+        begin = round(player.board.rises(0)[0] - stretched_steps(motion.segments, slices, 0)[0])
         off = (0.15 * 3000, 0.0)[joint]
         for tick, model in zip(player.board.rises(joint), predicted, strict=True):
             assert -11 * (1 + model // 600_000) - TICKS_OFF <= tick - begin - model <= TICKS_OFF + off

@@ -174,28 +174,37 @@ __attribute__((naked, noinline)) void add_to(Fixed48&, Fixed48) {
         )");
 }
 
-// Long division, bit by bit: the quotient's bits enter where the dividend's leave. a in r25 to r22, b in r20;
-// the sixteen bits behind a are r27 and r26, what is left over is r21.
+// Long division, digit by digit of eight bits: a, and sixteen bits of 0 behind it, go out to the left from r25
+// to r22, r27 and r26, and the quotient's digits come in on the right. b is in r20, what is left over in r21,
+// the digit in r18. Digits of 0 before the first other one take no time.
 __attribute__((naked, noinline)) uint32_t divide_q16(uint32_t, uint8_t) {
     __asm__ __volatile__(
         R"(
         clr  r26
         clr  r27
         clr  r21
-        ldi  r30, 48
-    1:  lsl  r26
-        rol  r27
-        rol  r22
-        rol  r23
-        rol  r24
-        rol  r25
+        ldi  r31, 6
+    1:  mov  r18, r25
+        mov  r25, r24
+        mov  r24, r23
+        mov  r23, r22
+        mov  r22, r27
+        mov  r27, r26
+        mov  r26, r18
+        or   r26, r21
+        breq 5f
+        ldi  r30, 8
+    2:  lsl  r18
         rol  r21
-        brcs 2f
-        cp   r21, r20
         brcs 3f
-    2:  sub  r21, r20
-        inc  r26
-    3:  dec  r30
+        cp   r21, r20
+        brcs 4f
+    3:  sub  r21, r20
+        inc  r18
+    4:  dec  r30
+        brne 2b
+        mov  r26, r18
+    5:  dec  r31
         brne 1b
         movw r24, r22
         movw r22, r26

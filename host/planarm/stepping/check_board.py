@@ -12,10 +12,13 @@ from planarm_wire.board_budget import (
     LATEST_READ_TICKS,
     LEAST_SHARE,
     LINE_LOAD,
+    MOST_SLOWED_TICKS,
     PREPARED_SLICES,
     READ_JOINT_TICKS,
     READ_TICKS,
     SLICE_JOINT_TICKS,
+    SLOWED_JOINT_TICKS,
+    SLOWED_TICKS,
     STEP_INTERRUPT_TICKS,
     work_ticks,
 )
@@ -50,6 +53,7 @@ def check_board(table: SegmentTable, made: StepTrain, link: LinkSpec) -> list[Ch
         return []
     return [
         _check_load(table, made),
+        _check_slowed(table),
         _check_peak(table, link),
         *_check_margin(table, link),
         *_check_supply(table, link),
@@ -69,6 +73,17 @@ def _check_load(table: SegmentTable, made: StepTrain) -> Check:
     where = _time(int(ticks[within.argmax()])) if len(ticks) else ""
     setting = "joints.microsteps or joints.max_speed_deg_s"
     return at_most("interrupt load in any 5 ms", load, MOST_LOAD, "", where, setting, amber=AMBER_LOAD)
+
+
+def _check_slowed(table: SegmentTable) -> Check:
+    """Check that the board prepares slices in time while it slows down: a hold would end in a missed step otherwise."""
+    moving = (table.counts > 0).sum(axis=1)
+    needed = (SLOWED_TICKS + SLOWED_JOINT_TICKS * moving) / np.maximum(1.0 - _interrupt_loads(table), LEAST_SHARE)
+    k = int(needed.argmax())
+    where = f"segment {k}, {_time(int(table.starts[k]))}"
+    setting = "joints.microsteps or joints.max_speed_deg_s"
+    limit_s = MOST_SLOWED_TICKS / TICKS_HZ
+    return at_most("time to prepare a slice of a stop", float(needed[k]) / TICKS_HZ, limit_s, "s", where, setting)
 
 
 def _share_of_frame(table: SegmentTable) -> Floats:

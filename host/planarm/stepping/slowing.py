@@ -13,7 +13,7 @@ from numpy.lib.stride_tricks import sliding_window_view
 
 from planarm.scene import Scene
 from planarm.stepping.plan import SegmentPlan
-from planarm.stepping.stopping import allowances, held_until, slice_lengths
+from planarm.stepping.stopping import Slices, allowances, held_until
 from planarm.stepping.table import SegmentTable, segment_bytes, table_of
 from planarm.stepping.train import Floats, Ticks
 from planarm.trajectory.motion import Trajectory
@@ -85,8 +85,9 @@ def link_margin_ticks(board: Board) -> int:
 
 def last_slices(table: SegmentTable) -> Ticks:
     """Return the start of each segment's last slice."""
-    lengths = slice_lengths(table.durations)
-    return np.asarray(table.starts[:-1] + (table.durations - 1) // lengths * lengths)
+    slices = Slices.of(table.durations.tolist())
+    last = np.searchsorted(slices.segment, np.arange(len(table.durations)), side="right") - 1
+    return np.asarray(table.starts[0] + slices.starts[last])
 
 
 ROAD_SHARE = 0.95

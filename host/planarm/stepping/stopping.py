@@ -9,7 +9,8 @@ The motors keep their torque besides, as far as the plan may use it (`planarm.tr
 
 The device changes the clock from slice to slice of a segment: with the stretch s = 1 / u, a slice of duration D that
 starts at s0 ends at s1 = s0 + slow D s0^3, at most 2 s0 (docs/protocol.md). Once all motors are below their start-stop
-speeds it stops. `need` follows that rule, slice by slice, so it is what the device takes.
+speeds it stops. `need` follows that rule in slices as long as at the planned pace; the device's become shorter with
+the stretch, so it takes no more.
 """
 
 from collections.abc import Sequence
@@ -50,7 +51,7 @@ LARGEST_GROWTH = 2.0
 
 
 class Slices(NamedTuple):
-    """The slices into which the device cuts segments; shape (slices,) each."""
+    """The slices into which the device cuts segments at the planned pace; shape (slices,) each."""
 
     starts: Ticks
     durations: Ticks
@@ -61,18 +62,15 @@ class Slices(NamedTuple):
     def of(cls, durations_ticks: Sequence[int]) -> Self:
         """Return the slices of segments with these durations, in order."""
         durations = np.asarray(durations_ticks, np.int64)
-        lengths = slice_lengths(durations)
-        counts = -(-durations // lengths)
+        counts = -(-durations // SLICE_TICKS)
         segment = np.repeat(np.arange(len(durations)), counts)
-        since = (np.arange(len(segment)) - (np.cumsum(counts) - counts)[segment]) * lengths[segment]
-        starts = (np.cumsum(durations) - durations)[segment] + since
-        return cls(starts, np.minimum(lengths[segment], durations[segment] - since), segment)
-
-
-def slice_lengths(durations: Ticks) -> Ticks:
-    """Return the length of each segment's slices but the last."""
-    counts = -(-durations // SLICE_TICKS)
-    return np.asarray(-(-durations // counts))
+        number = np.arange(len(segment)) - (np.cumsum(counts) - counts)[segment]
+        whole = np.maximum(counts - 2, 0)[segment]
+        last_two = durations[segment] - whole * SLICE_TICKS
+        half = np.where(counts[segment] == 1, last_two, (last_two + 1) // 2)
+        since = np.minimum(number, whole) * SLICE_TICKS + np.where(number > whole, half, 0)
+        lengths = np.where(number < whole, SLICE_TICKS, np.where(number > whole, last_two - half, half))
+        return cls((np.cumsum(durations) - durations)[segment] + since, lengths, segment)
 
 
 def allowances(trajectory: Trajectory, scene: Scene, durations_ticks: Sequence[int]) -> tuple[Allowance, ...]:
