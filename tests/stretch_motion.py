@@ -161,8 +161,8 @@ def stretched_slices(
     """All slices, when a hold slows down from segment `hold` on and the clock rests in slice `rest`.
 
     Gentle changes use half of the allowance. Without a hold the stretch goes to `target` from the start. With each
-    doubling of the stretch slices are half as long. The last two of a segment are alike; stretched, the last may be twice
-    as long.
+    doubling of the stretch slices are half as long. The last two of a segment are alike; stretched, the last may be
+    twice as long.
     """
     slices: list[StretchedSlice] = []
     stretch, path = ONE if hold is not None else target, 0
