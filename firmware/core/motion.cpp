@@ -99,7 +99,7 @@ class Motion {
     uint8_t need;  // in NEED_UNIT_TICKS
 
     bool segment_last;
-    uint32_t left_ticks;   // of the segment, in no slice yet
+    uint32_t left_ticks;  // of the segment, in no slice yet
 
     bool filling;  // a slice
     bool urgent;   // the last call of serve handed something over

@@ -70,8 +70,8 @@ class Slice {
     uint32_t end_ticks_;
     uint32_t s0_;
     uint32_t s1_;
-    uint32_t range_;          // from the lesser stretch to the greater one
-    uint32_t reciprocal_;     // 2^32 / divided_ticks_, the path ticks of the last slice that needed it
+    uint32_t range_;       // from the lesser stretch to the greater one
+    uint32_t reciprocal_;  // 2^32 / divided_ticks_, the path ticks of the last slice that needed it
     uint16_t divided_ticks_;
     Way way_;
     bool plain_;

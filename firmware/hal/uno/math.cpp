@@ -174,9 +174,9 @@ __attribute__((naked, noinline)) void add_to(Fixed48&, Fixed48) {
         )");
 }
 
-// Long division, digit by digit of eight bits: a, and sixteen bits of 0 behind it, go out to the left from r25
-// to r22, r27 and r26, and the quotient's digits come in on the right. b is in r20, what is left over in r21,
-// the digit in r18. Digits of 0 before the first other one take no time.
+// Long division, digit by digit of eight bits: a, and sixteen bits of 0 behind it, go out to the left from
+// r25 to r22, r27 and r26, and the quotient's digits come in on the right. b is in r20, what is left over in
+// r21, the digit in r18. Digits of 0 before the first other one take no time.
 __attribute__((naked, noinline)) uint32_t divide_q16(uint32_t, uint8_t) {
     __asm__ __volatile__(
         R"(
