@@ -50,6 +50,7 @@ from planarm_wire.messages import (
     Status,
     Stop,
 )
+from planarm_wire.rates import rate_value
 from stretch_motion import (
     ONE,
     SEGMENT_TICKS,
@@ -313,6 +314,29 @@ def test_a_silent_host_brings_the_arm_to_rest_on_the_path(firmware: Firmware) ->
     player.board.run(5_000_000)
     assert [len(player.board.rises(joint)) for joint in range(JOINTS)] == made
     player.assert_all_steps_made()
+
+
+def test_a_quick_stop_takes_less_way_and_less_time(native_firmware: NativeFirmware) -> None:
+    """At most twice what continuous time would take with all of the allowance, or half of it: u' = -rate."""
+
+    def stopped(quick: int) -> tuple[int, int]:
+        player = Player(native_firmware, FAST)
+        player.start()
+        player.play_until(player.board.now + 25 * SEGMENT_TICKS)
+        asked, before = player.board.now, len(player.board.rises(0))
+        player.board.send(Stop(quick))
+        player.play_until(asked + 10**8, State.READY, feed=False)
+        rises = player.board.rises(0)
+        return len(rises) - before, rises[-1] - asked
+
+    (way, ticks), (quick_way, quick_ticks) = stopped(0), stopped(1)
+    latest = 2 * SEGMENT_TICKS  # what is prepared, and the slice in which the clock comes to rest
+    rate = rate_value(FAST.heads[25][0]) / 2**32
+    calm = 800 / FAST.start_stop_ticks[0]
+    assert quick_ticks <= 2 * (1 - calm) / rate + latest
+    assert ticks <= 4 * (1 - calm) / rate + latest
+    assert quick_way < way
+    assert quick_ticks < ticks
 
 
 @pytest.mark.parametrize("quick", [0, 1])
