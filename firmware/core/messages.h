@@ -81,9 +81,9 @@ constexpr uint16_t MIN_SLOW_INTERVAL_TICKS = 32768U;
 constexpr uint32_t MAX_SLOW_INTERVAL_TICKS = 16777215UL;
 // A move of so many steps or fewer tells its add in 2^-8 ticks; a slow move has no more.
 constexpr uint8_t MAX_COARSE_STEPS = 128;
-// The device cuts segments into slices of 3.6 ms, with each doubling of the stretch half as long,
-// the last up to twice as long; at the planned pace the last two of a segment are alike. One run of
-// a joint fills a slice at its least interval. The path clock's rate changes from slice to slice.
+// The device cuts segments into slices of 3.6 ms, the last two alike. With each doubling of the
+// stretch they are half as long, the last up to twice. One run of a joint fills a slice at its
+// least interval. The path clock's rate changes from slice to slice.
 constexpr uint16_t SLICE_TICKS = 57000U;
 // Longest segment, about 67 s.
 constexpr uint32_t MAX_SEGMENT_TICKS = 1073741823UL;
@@ -201,8 +201,8 @@ enum class Fault : uint8_t {
 
 // Why the device last started.
 enum class Reset : uint8_t {
-    // The chip does not tell, and its memory was in use before: the reset line, a short loss of
-    // power, or the watchdog where the main program stood still with interrupts off.
+    // The chip does not tell, and its memory was in use before: reset line, short loss of power. Or
+    // the watchdog, where the main program stood still with interrupts off.
     UNKNOWN = 0,
     // Power came on.
     POWER_ON = 1,

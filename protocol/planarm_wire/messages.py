@@ -87,9 +87,10 @@ MAX_SLOW_INTERVAL_TICKS: Final = 16_777_215
 MAX_COARSE_STEPS: Final = 128
 """A move of so many steps or fewer tells its add in 2^-8 ticks; a slow move has no more."""
 SLICE_TICKS: Final = 57_000
-"""The device cuts segments into slices of 3.6 ms, with each doubling of the stretch half as long, the last up to twice as long; at the planned pace the last two of a segment are alike.
+"""The device cuts segments into slices of 3.6 ms, the last two alike.
 
-One run of a joint fills a slice at its least interval. The path clock's rate changes from slice to slice.
+With each doubling of the stretch they are half as long, the last up to twice. One run of a joint fills a slice at
+its least interval. The path clock's rate changes from slice to slice.
 """
 MAX_SEGMENT_TICKS: Final = 1_073_741_823
 """Longest segment, about 67 s."""
@@ -325,7 +326,9 @@ class Reset(IntEnum):
     """Why the device last started."""
 
     UNKNOWN = 0
-    """The chip does not tell, and its memory was in use before: the reset line, a short loss of power, or the watchdog where the main program stood still with interrupts off.
+    """The chip does not tell, and its memory was in use before: reset line, short loss of power.
+
+    Or the watchdog, where the main program stood still with interrupts off.
     """
     POWER_ON = 1
     """Power came on."""

@@ -17,7 +17,7 @@ from planarm.campaign.engine import LocalEngine
 from planarm.campaign.line_faults import FAULTS, damaged
 from planarm.campaign.run import run_campaign
 from planarm.campaign.spec import load_campaign
-from planarm.campaign.store import JOINED, read_rows
+from planarm.campaign.store import JOINED, ResultStore, read_rows
 from planarm.campaign.task import SceneText
 from planarm.campaign.work import run_kind, scene_of
 from planarm.campaign.worker import started_deaf_to_ctrl_c
@@ -139,6 +139,19 @@ def test_a_killed_process_leaves_whole_rows_that_resume_completes(tmp_path):
     campaign = replace(campaign, batch=50)
     table = run_campaign(replace(campaign, source="campaign.toml"), LocalEngine(1), tmp_path / "out", True, quiet).table
     assert [row["set.seed"] for row in rows_of(table)] == list(range(400))
+
+
+def test_rows_that_ctrl_c_finds_written_and_not_counted_are_told(tmp_path, monkeypatch):
+    add = ResultStore.add
+
+    def written_then_interrupted(self, rows, scenes):
+        add(self, rows, scenes)
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(ResultStore, "add", written_then_interrupted)
+    campaign = self_test(tmp_path, ["answer", "raise"])
+    stopped = run_campaign(campaign, LocalEngine(1), tmp_path / "out", False, quiet)
+    assert sum(stopped.verdicts.values()) == len(rows_of(stopped.table)) > 0
 
 
 def test_ctrl_c_ends_with_130_and_keeps_what_finished(tmp_path):

@@ -254,7 +254,7 @@ def test_a_packer_keeps_segments_back_until_it_is_given_others(plan):
 def test_a_stream_takes_no_plan_that_begins_otherwise(plan):
     segments, allowances = plan.segments.segments, plan.segments.allowances
     stream = Stream(Session(1, 0.0), segments)
-    stream._packer.sent = 2
+    stream._feed.join_at(2)
     other = (segments[0], segments[2], *segments[3:])
     with pytest.raises(CertificateError, match="other segments than the 2 that were sent"):
         stream.go_on_with(other, allowances[1:])

@@ -63,6 +63,8 @@ def run_campaign(
                 verdicts.update(row.verdict for row in rows)
                 on_progress(_progress(verdicts.total(), len(done), campaign.size, time.monotonic() - began_s))
         except KeyboardInterrupt:
+            if len(store.done()) - len(done) > verdicts.total():  # the last rows were written, not counted yet
+                verdicts.update(row.verdict for row in rows)
             if not (verdicts or done):  # there is nothing to keep or to tell of
                 raise
             stopped = True
