@@ -154,11 +154,11 @@ bool Cursor::take(const Slice& slice, Run& run) {
             run.steps = 1;
         }
     }
-    // From slice to slice the number of steps changes little: where one run makes them all, one less is a
-    // good guess, as a step more takes less time than one back.
+    // From slice to slice the number of steps changes little: where one run makes them all it is a good
+    // guess. While the clock is stretched one less, as a step more takes less time than one back.
     const bool all =
         run.steps != step_engine::MAX_RUN_STEPS && first_path <= whole_ticks(first.left_.interval);
-    guess_ = all ? static_cast<uint8_t>(run.steps - 1) : 0;
+    guess_ = all ? static_cast<uint8_t>(run.steps - !slice.is_plain()) : 0;
     left_.count = static_cast<uint16_t>(left_.count - run.steps);
     last_path_ticks_ = at_.high;
     step();

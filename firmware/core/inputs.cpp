@@ -54,7 +54,7 @@ void serve() {
     at.steady ^= at.twice;
     at.left &= at.steady;
     const uint8_t waiting = differs ^ at.twice;
-    at.twice = at.once;
+    at.twice = at.once & waiting;
     at.once = waiting;
 }
 

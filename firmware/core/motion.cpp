@@ -23,6 +23,10 @@ namespace {
 // soon.
 constexpr int32_t PREPARE_AHEAD_TICKS = wire::MIN_LEAD_TICKS;
 
+// A stretched slice that is begun with less time left is late: the main program needs some 40,000 ticks for
+// it.
+constexpr int32_t LATE_TICKS = 44000;
+
 // Segments must have come this long before they start: 2.5 ms.
 constexpr int32_t LATEST_ARRIVAL_TICKS = 40000;
 
@@ -74,7 +78,7 @@ class Motion {
     bool is_in_segment() const { return filling || left_ticks != 0; }
     bool is_starving(uint8_t margin) const;
     void read_next_segment();
-    void open_slice();
+    void open_slice(bool late);
     bool fill_slice();
     void prepare();
     Progress retire();
@@ -160,7 +164,8 @@ uint32_t next_slice_ticks(uint32_t left_ticks, const Slice& before) {
     return left_ticks < 2 * ticks ? left_ticks : ticks;
 }
 
-[[gnu::noinline]] void Motion::open_slice() {
+// Late, it is slowed down by all of its rates until there is time again.
+[[gnu::noinline]] void Motion::open_slice(bool late) {
     path_clock::Way& way = slice.way();
     const uint16_t ticks = static_cast<uint16_t>(next_slice_ticks(left_ticks, slice));
     if (ticks != way.path_ticks) {
@@ -170,7 +175,7 @@ uint32_t next_slice_ticks(uint32_t left_ticks, const Slice& before) {
     way.ends_segment = left_ticks == way.path_ticks;
     left_ticks -= way.path_ticks;
     way.target = override_stretch;
-    way.gently = !(wish == Wish::REST_QUICKLY || is_starving(STARVING_MARGIN));
+    way.gently = !(late || wish == Wish::REST_QUICKLY || is_starving(STARVING_MARGIN));
     if (!way.gently || wish == Wish::REST) way.target = path_clock::MAX_STRETCH;
     slice.follow();
     Prepared& entry = hal::by_base(prepared[prepared_count++]);
@@ -218,7 +223,7 @@ void Motion::prepare() {
         }
         const int32_t away_ticks = clock::ticks_until(slice.end_ticks());
         if (prepared_count == MAX_SLICES || away_ticks > PREPARE_AHEAD_TICKS) return;
-        open_slice();
+        open_slice(stretched && away_ticks < LATE_TICKS);
         urgent = !slice.is_plain();  // else there is time for a run, too
     }
     filling = !fill_slice();

@@ -45,10 +45,13 @@ SLOWED_TICKS: Final = 3_100
 SLOWED_JOINT_TICKS: Final = 5_200
 """The main program's work on a slice of the path that is slowed down, and on each joint that moves in it: cycles of
 `Motion::open_slice`, of `Cursor::take` (3,900 to 4,300 on average) and of the passes that they come in."""
-MOST_SLOWED_TICKS: Final = 41_000
-"""In that time a slowed slice must be prepared: MIN_LEAD_TICKS less what one pass that looks at the line may take.
-Measured on the emulator (docs/decisions/0133): two joints at 265 ticks, or four at 1,600, hold in every phase on a
-line that is full of queries or of repeated segments; at 255 and 1,300 they do not."""
+READ_SLOWED_TICKS: Final = 1_400
+READ_SLOWED_JOINT_TICKS: Final = 1_200
+"""What a segment's first slice takes more, and for each joint of the board: `Motion::read_next_segment`."""
+LINE_PASS_TICKS: Final = 15_000
+"""What one pass that looks at the line may take; a slowed slice must be ready so long before it begins. Measured on the
+emulator (docs/decisions/0133): two joints at 265 ticks, or four at 1,600, hold in every phase on a line that is full of
+queries or of repeated segments; at 255 and 1,300 they do not."""
 LATEST_READ_TICKS: Final = 40_000
 """How long before its start a segment must be there."""
 LEAST_SHARE: Final = 0.05

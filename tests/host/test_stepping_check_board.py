@@ -75,18 +75,20 @@ def test_interrupts_leave_a_fifth_of_every_5_ms(steps, verdict):
 
 
 @pytest.mark.parametrize(
-    ("interval", "both", "verdict"), [(265, True, "green"), (255, True, "red"), (225, False, "green")]
+    ("interval", "duration", "both", "verdict"),
+    [
+        (285, 228_000, True, "green"),
+        (255, 228_000, True, "red"),
+        (225, 228_000, False, "green"),
+        (270, 70_000, True, "red"),  # two slices, each shorter than what it takes
+        (340, 70_000, True, "green"),
+    ],
 )
-def test_a_slice_that_is_slowed_down_must_be_ready_in_time(interval, both, verdict):
-    """tests/firmware/test_firmware_fast_holds.py: two joints at 265 ticks are held in any phase on a full line."""
-    move = Move(2 * (80_000 // interval) + 1, 0, interval << 8)
-    plan = plan_of((400_000, REST, REST), (80_000, move, move if both else REST), (400_000, REST, REST))
-    (check,) = (check for check in checks_of(plan) if "slice of a stop" in check.name)
-    joints = 2 if both else 1
-    share = 0.1 + joints * 75 / interval
-    assert check.value == pytest.approx((3_100 + 5_200 * joints) / (1 - share) / 16e6, rel=0.01)
-    assert check.verdict == verdict
-    assert "segment 1" in check.where
+def test_slices_that_are_slowed_down_must_be_ready_in_time(interval, duration, both, verdict):
+    """tests/firmware/test_firmware_fast_holds.py: such joints are held in any phase on a full line."""
+    move = Move(2 * (duration // interval) + 1, 0, interval << 8)
+    plan = plan_of((400_000, REST, REST), *[(duration, move, move if both else REST)] * 40, (400_000, REST, REST))
+    assert verdict_of(checks_of(plan), "in a stop") == verdict
 
 
 @pytest.mark.parametrize(("segments_hz", "verdict"), [(300, "green"), (840, "amber"), (1500, "red")])

@@ -1,6 +1,7 @@
 """Certificate: what the line has to bring and the board has to do, against what they can."""
 
 from bisect import bisect_right
+from typing import NamedTuple
 
 import numpy as np
 
@@ -12,9 +13,11 @@ from planarm_wire.board_budget import (
     LATEST_READ_TICKS,
     LEAST_SHARE,
     LINE_LOAD,
-    MOST_SLOWED_TICKS,
+    LINE_PASS_TICKS,
     PREPARED_SLICES,
     READ_JOINT_TICKS,
+    READ_SLOWED_JOINT_TICKS,
+    READ_SLOWED_TICKS,
     READ_TICKS,
     SLICE_JOINT_TICKS,
     SLOWED_JOINT_TICKS,
@@ -76,14 +79,21 @@ def _check_load(table: SegmentTable, made: StepTrain) -> Check:
 
 
 def _check_slowed(table: SegmentTable) -> Check:
-    """Check that the board prepares slices in time while it slows down: a hold would end in a missed step otherwise."""
+    """Check that the board prepares slices in time while it slows down: a hold would end in a missed step otherwise.
+
+    It is asked of all of the path at nearly the planned pace, where least time is left: an override may keep it so.
+    """
     moving = (table.counts > 0).sum(axis=1)
-    needed = (SLOWED_TICKS + SLOWED_JOINT_TICKS * moving) / np.maximum(1.0 - _interrupt_loads(table), LEAST_SHARE)
-    k = int(needed.argmax())
+    slices = _slices(table)
+    work = SLOWED_TICKS + SLOWED_JOINT_TICKS * moving[slices.segment]
+    # A segment is read while the slice before is made, where there is time.
+    reading = READ_SLOWED_TICKS + READ_SLOWED_JOINT_TICKS * table.counts.shape[1]
+    work = work + reading // np.bincount(slices.segment)[slices.segment]
+    ahead_ticks, k = _ahead_of(table, slices, work)
     where = f"segment {k}, {_time(int(table.starts[k]))}"
     setting = "joints.microsteps or joints.max_speed_deg_s"
-    limit_s = MOST_SLOWED_TICKS / TICKS_HZ
-    return at_most("time to prepare a slice of a stop", float(needed[k]) / TICKS_HZ, limit_s, "s", where, setting)
+    ahead_s = (ahead_ticks - LINE_PASS_TICKS) / TICKS_HZ
+    return at_least("time to spare in a stop", ahead_s, 0.0, "s", where, setting)
 
 
 def _share_of_frame(table: SegmentTable) -> Floats:
@@ -179,22 +189,50 @@ def _check_supply(table: SegmentTable, link: LinkSpec) -> list[Check]:
 def _ahead_of_preparing(table: SegmentTable) -> tuple[float, int]:
     """Return the least time by which a slice of a segment is prepared before it begins, and the segment.
 
-    That takes its time also where the queue held everything at the start. The board prepares a slice MIN_LEAD_TICKS
-    before its start, and no more than PREPARED_SLICES ahead; what it has to do on a segment is due by its first slice.
+    That takes its time also where the queue held everything at the start. What the board has to do on a segment is due
+    by its first slice.
     """
-    moving, loads = (table.counts > 0).sum(axis=1), _interrupt_loads(table)
-    slices = (table.durations - 1) // SLICE_TICKS + 1
-    segment = np.repeat(np.arange(len(slices)), slices)
-    number = np.arange(len(segment)) - np.repeat(np.cumsum(slices) - slices, slices)
-    starts = table.starts[segment] + number * (table.durations // slices)[segment]
-    work = np.where(number == 0, READ_TICKS + READ_JOINT_TICKS * moving[segment], SLICE_JOINT_TICKS * moving[segment])
-    work = work / np.maximum(1.0 - loads[segment], LEAST_SHARE)
+    moving = (table.counts > 0).sum(axis=1)
+    slices = _slices(table)
+    first = np.diff(slices.segment, prepend=-1) != 0
+    moved = moving[slices.segment]
+    work = np.where(first, READ_TICKS + READ_JOINT_TICKS * moved, SLICE_JOINT_TICKS * moved)
+    return _ahead_of(table, slices, work)
+
+
+class _Slices(NamedTuple):
+    """The device's slices; shape (slices,) each."""
+
+    starts: Ticks
+    segment: Ticks
+    """Index of the segment."""
+
+
+def _slices(table: SegmentTable) -> _Slices:
+    """Cut the path as the device does at the planned pace: docs/protocol.md, slice_ticks."""
+    starts, segment = [], []
+    for k, (start, left) in enumerate(zip(table.starts.tolist(), table.durations.tolist(), strict=False)):
+        while left > 0:
+            starts.append(start)
+            segment.append(k)
+            length = left if left <= SLICE_TICKS else min(SLICE_TICKS, (left + 1) // 2)
+            start, left = start + length, left - length  # noqa: PLW2901
+    return _Slices(np.array(starts, np.int64), np.array(segment, np.int64))
+
+
+def _ahead_of(table: SegmentTable, slices: _Slices, work: Ticks) -> tuple[float, int]:
+    """Return the least time by which slices are ready that take so much work each, and the segment where it is.
+
+    The board prepares a slice MIN_LEAD_TICKS before its start, and no more than PREPARED_SLICES ahead.
+    """
+    starts = slices.starts
+    takes = work / np.maximum(1.0 - _interrupt_loads(table)[slices.segment], LEAST_SHARE)
     freed = np.concatenate([np.full(PREPARED_SLICES - 1, starts[0] - MIN_LEAD_TICKS), starts])[: len(starts)]
     begun = np.maximum(starts - MIN_LEAD_TICKS, freed)
-    until = np.cumsum(work)
-    ahead = starts - until - np.maximum.accumulate(begun - (until - work))
+    until = np.cumsum(takes)
+    ahead = starts - until - np.maximum.accumulate(begun - (until - takes))
     k = int(ahead.argmin())
-    return float(ahead[k]), int(segment[k])
+    return float(ahead[k]), int(slices.segment[k])
 
 
 def _begun_before(table: SegmentTable) -> Ticks:
