@@ -36,7 +36,7 @@ def test_a_run_is_started_held_resumed_and_ends_well(live, opened, violations):
     run, address = live
     with opened(address) as page:
         shown(page, "waiting for the start")
-        assert page.get_by_role("button", name="Hold").is_disabled()
+        page.get_by_role("button", name="Hold", disabled=True).wait_for(timeout=COMPILING_MS)
         page.get_by_role("button", name="Start").click()
         shown(page, "running")
         page.get_by_role("button", name="Hold").click()

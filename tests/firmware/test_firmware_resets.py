@@ -110,8 +110,7 @@ def stand_still(firmware: EmulatedFirmware, *, interrupts: bool) -> None:
     """Let the main program do nothing any more, with interrupts on or off."""
     chip, code = firmware.uno._chip, firmware.uno.flash
     chip.pc = next(word for word in range(len(code) // 2) if code[2 * word : 2 * word + 2] == JUMP_TO_ITSELF)
-    if not interrupts:
-        chip.sreg &= 0x7F
+    chip.sreg = chip.sreg & 0x7F | interrupts << 7  # a lock or an interrupt may have them off just now
 
 
 INTERRUPTS = pytest.mark.parametrize("interrupts", [True, False], ids=["interrupts on", "interrupts off"])
