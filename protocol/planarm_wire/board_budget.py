@@ -50,8 +50,8 @@ READ_SLOWED_JOINT_TICKS: Final = 1_200
 """What a segment's first slice takes more, and for each joint of the board: `Motion::read_next_segment`."""
 LINE_PASS_TICKS: Final = 15_000
 """What one pass that looks at the line may take; a slowed slice must be ready so long before it begins. Measured on the
-emulator (docs/decisions/0133): two joints at 265 ticks, or four at 1,600, hold in every phase on a line that is full of
-queries or of repeated segments; at 255 and 1,300 they do not."""
+emulator (docs/decisions/0133): two joints at 265 ticks hold in every phase on a line that is full of queries or of
+repeated segments, four at 1,600 in 58 of 60 cases; at 255 and 1,300 they do not."""
 LATEST_READ_TICKS: Final = 40_000
 """How long before its start a segment must be there."""
 LEAST_SHARE: Final = 0.05
