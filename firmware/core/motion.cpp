@@ -106,7 +106,7 @@ class Motion {
     uint32_t left_ticks;  // of the segment, in no slice yet
 
     bool filling;  // a slice
-    bool urgent;   // the last call of serve handed something over
+    bool urgent;   // more is to be handed over before the line is looked at
     uint8_t turn;  // the joint whose run was handed over last
     uint8_t prepared_count;
     uint32_t frozen_ticks;

@@ -31,9 +31,8 @@ struct Run {
     bool dir_high;
 };
 
-// One run more than can be in use, so that a full ring and an empty one differ. Four joints have two: the
-// bytes of a third are the queue's, and the pace that the certificate asks for is kept
-// (tests/firmware/test_firmware_pace.py).
+// One run more than can be in use, so that a full ring and an empty one differ. The pace that the certificate
+// asks for is kept with three (tests/firmware/test_firmware_pace.py).
 constexpr uint8_t RING_RUNS = 4;
 struct StepJoint {
     Run* volatile active;     // the run in progress, or the next one

@@ -33,7 +33,7 @@ SLICE_JOINT_TICKS: Final = 4_000
 """The same on each joint in each further slice of it."""
 
 PREPARED_SLICES: Final = 3
-"""Of so many slices a joint has runs at once, the one being executed included (firmware/core/step_engine.cpp)."""
+"""Of so many slices a joint has runs at once, the one being executed included (firmware/core/step_engine.h)."""
 
 LINE_LOAD: Final = 0.1
 """Share of the processor that the interrupts of a busy line take."""

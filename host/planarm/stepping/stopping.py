@@ -9,8 +9,8 @@ The motors keep their torque besides, as far as the plan may use it (`planarm.tr
 
 The device changes the clock from slice to slice of a segment: with the stretch s = 1 / u, a slice of duration D that
 starts at s0 ends at s1 = s0 + slow D s0^3, at most 2 s0 (docs/protocol.md). Once all motors are below their start-stop
-speeds it stops. `need` follows that rule in slices as long as at the planned pace; the device's become shorter with
-the stretch, so it takes no more.
+speeds it stops. `need` follows that rule in slices as long as at the planned pace. The device's become shorter with
+the stretch, by which it slows down sooner; only the last of a segment may be longer than the one here.
 """
 
 from collections.abc import Sequence
