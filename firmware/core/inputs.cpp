@@ -39,6 +39,7 @@ bool is_set(uint8_t bits, uint8_t joint) { return ((bits >> joint) & 1) != 0; }
 }  // namespace
 
 void reset() {
+    hal::clear_at_start(state);
     Inputs& at = hal::by_base(state);
     at.steady = at.left = read();
 }
