@@ -247,8 +247,8 @@ void drop_runs() {
     step_missed = 0;
 }
 
-// Locked for 47 to 62 cycles, with four joints up to 224, which a step that comes meanwhile can bear: joints
-// that may stop dead step far slower than the least interval.
+// Locked for up to 93 cycles, with four joints up to 224 (tests/firmware/test_firmware_locks.py), which a
+// step that comes meanwhile can bear: joints that may stop dead step far slower than the least interval.
 bool freeze(uint32_t& now_ticks) {
     uint8_t on;
     uint16_t counter;

@@ -170,55 +170,6 @@ def test_the_librarys_common_prologue_is_refused(tmp_path: Path) -> None:
     assert re.search(r"__(prologue_saves|epilogue_restores)__ .* uses a register of the interrupts", done.stderr)
 
 
-# Two of each are the instruction between two interrupts. firmware/README.md, budgets: with 11 the sum of `uno` is its
-# least interval of 225. `uno_four` has four joints to look at; its sum is 651 of 1,000.
-LOCK_CYCLES = {"uno": 13, "uno_four": 17, "uno_slow": 17}
-# Around the start of a joint at rest (the sum leaves 88, as no step of that joint waits for the other's), what rests,
-# and what ends a motion; but in the last the other joint may step. What loops over four joints is counted once.
-LONG_LOCK_CYCLES = {"start": 64, "serve": 50, "freeze": 80, "end_steps": 34}
-
-
-def locked_cycles(listing: str) -> dict[str, int]:
-    """The longest stretch from CLI to the second instruction behind the one that lets interrupts in again, by function.
-
-    One of those comes before the next interrupt, one after it.
-    """
-    two = {"lds", "sts", "ld", "ldd", "st", "std", "push", "pop", "sbi", "cbi", "sbiw", "adiw", "rjmp", "mul"}
-    found: dict[str, int] = {}
-    for function in listing.split("\n\n"):
-        title, *lines = function.splitlines() or [""]
-        words = [line.split("\t")[1:3] for line in lines if "\t" in line]
-        code = [(word[0].split()[0], word[1] if len(word) > 1 else "") for word in words if word and word[0].strip()]
-        for at, (name, _) in enumerate(code):
-            if name != "cli":
-                continue
-            ends = (i for i in range(at, len(code)) if code[i][0] == "out" and code[i][1].startswith("0x3f"))
-            end = next(ends, None)
-            if end is None:
-                assert "<_exit>" in title, f"{title}: locked to its end"
-                continue
-            cycles = [4 if one in ("ret", "call", "rcall") else 2 if one in two else 1 for one, _ in code[at : end + 3]]
-            found[title] = max(found.get(title, 0), sum(cycles))
-    return found
-
-
-@needs_avr_gcc
-@pytest.mark.parametrize("board", LOCK_CYCLES)
-def test_locks_that_are_met_while_joints_step_are_short(built_image: Callable[[str], Path], board: str) -> None:
-    # firmware/README.md, budgets: 11 cycles and 2.
-    listing = subprocess.run(
-        ["avr-objdump", "-d", "-C", "--no-show-raw-insn", str(built_image(board).with_suffix(".elf"))],
-        capture_output=True,
-        text=True,
-        check=True,
-    ).stdout
-    locked = locked_cycles(listing)
-    assert len(locked) >= 4
-    for title, cycles in locked.items():
-        allowed = [most for name, most in LONG_LOCK_CYCLES.items() if f"::{name}(" in title]
-        assert cycles <= max([LOCK_CYCLES[board], *allowed]), title
-
-
 @needs_gxx
 @needs_pio
 def test_the_cores_own_tests(tmp_path: Path) -> None:

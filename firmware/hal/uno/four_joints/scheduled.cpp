@@ -25,8 +25,9 @@
 // The wake for a step is set so that the pin rises 93 to 161 ticks before its tick if nothing else runs. What
 // may run when it comes: a step of another joint (joint 3's 105, joint 1's on the shield 90), a lock of the
 // main program that begins right behind it (15, or 79 when a joint is started or a freeze finds joint 3
-// too near), the instructions around it (4), and for joint 3 the interrupt of joint 2 (107, and 2). So joint
-// 2 rises up to 95 ticks late, joint 3 up to 189. None rises more than 174 early: a look that comes for
+// too near), the instructions around it (4), and for joint 3 the interrupt of joint 2 (107, and 2). A freeze
+// that finds joint 2 too near locks for 128, while joint 3's step is farther than 400 away. So joint
+// 2 rises up to 122 ticks late, joint 3 up to 189. None rises more than 174 early: a look that comes for
 // another reason and finds the step less than SCHEDULED_EARLY_TICKS away raises it at once.
 
 #include <avr/interrupt.h>
