@@ -79,6 +79,22 @@ def by_time(scene, budget_s):
     return replace(scene, planner=replace(scene.planner, objective="time", budget_s=budget_s))
 
 
+class CountedTime:
+    """In place of `time` where a path is optimised for it: so much that a budget is the same work each time.
+
+    Seconds go by as they are asked for: on an idle computer a generation takes about this long.
+    """
+
+    READING_S = 2e-4
+
+    def __init__(self):
+        self._now_s = 0.0
+
+    def perf_counter(self):
+        self._now_s += self.READING_S
+        return self._now_s
+
+
 def quiet(_stage, _share):
     pass
 

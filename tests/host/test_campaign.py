@@ -154,6 +154,7 @@ def test_rows_that_ctrl_c_finds_written_and_not_counted_are_told(tmp_path, monke
     assert sum(stopped.verdicts.values()) == len(rows_of(stopped.table)) > 0
 
 
+@pytest.mark.usefixtures("ctrl_c")
 def test_ctrl_c_ends_with_130_and_keeps_what_finished(tmp_path):
     written(
         tmp_path,
@@ -176,6 +177,7 @@ def test_ctrl_c_ends_with_130_and_keeps_what_finished(tmp_path):
     assert f"{100_000 - len(found)} runs are missing, --resume goes on with them" in told
 
 
+@pytest.mark.usefixtures("ctrl_c")
 def test_ctrl_c_while_workers_start_is_one_sentence(tmp_path):
     written(tmp_path, 'kind = "self-test"\nscenes = ["scene.toml"]\n[vary]\nseed = { count = 100_000 }\n')
     command = [str(Path(sys.executable).with_name("planarm")), "campaign", "campaign.toml", "--out", "out"]
@@ -197,6 +199,7 @@ def test_ctrl_c_while_workers_start_is_one_sentence(tmp_path):
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows cannot keep a signal back")
+@pytest.mark.usefixtures("ctrl_c")
 def test_ctrl_c_in_the_moment_a_worker_starts_is_kept_and_the_worker_does_not_hear_it():
     heard = "import signal; print(signal.SIGINT not in signal.pthread_sigmask(signal.SIG_BLOCK, []))"
     told = ""

@@ -8,13 +8,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from live_runs import SCENE, by_time, circle, quiet, tip_at, with_jerk
+from live_runs import SCENE, CountedTime, by_time, circle, quiet, tip_at, with_jerk
 from planarm.errors import CertificateError, NoPathError, TimingError
 from planarm.link.packing import Packer
 from planarm.link.session import Session
 from planarm.link.stream import Stream
 from planarm.model.shapes import shape_of
 from planarm.model.transmission import motor_axes
+from planarm.motions import motion
 from planarm.motions.margin import planning_margin_cm
 from planarm.operations.replanning import first_plan
 from planarm.operations.splicing import Border, first_border, plan_from_border, why_not
@@ -186,9 +187,10 @@ IN_THE_WAY = by_time(replace(SCENE, obstacles=(circle(8.4, 40.6, 6.0),)), 0.2)
 
 
 @pytest.mark.parametrize("scene", [with_jerk(SCENE, 250.0), IN_THE_WAY], ids=["jerk", "time"])
-def test_other_motions_are_left_at_speed_and_acceleration(scene):
+def test_other_motions_are_left_at_speed_and_acceleration(scene, monkeypatch):
     """Around an obstacle: certified, the same up to the border, without a jump of speed, with limits of jerk of
     acceleration either; and where nothing leads on it says so."""
+    monkeypatch.setattr(motion, "time", CountedTime())
     task, plan = first_plan(scene, quiet)
     border, margin_cm = first_border(plan, 0, 0.1), planning_margin_cm(scene)
     obstacle = circle(*tip_at(plan, 0.8), 2.0)

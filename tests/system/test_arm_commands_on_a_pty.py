@@ -91,6 +91,7 @@ def test_zero_goto_jog_and_home_know_where_the_arm_is_from_one_program_to_the_ne
         assert back["usteps"] == pytest.approx(zeroed["usteps"], abs=8), "switches and zero agree"
 
 
+@pytest.mark.usefixtures("ctrl_c")
 def test_stop_asks_the_program_that_has_the_port_and_the_arm_rests_on_its_path(tmp_path):
     """A slow motion, so that the second program comes in time on any machine."""
     scene = tmp_path / "slow.toml"
