@@ -155,25 +155,31 @@ class StretchedSlice(NamedTuple):
     s1: int
 
 
+def slice_ticks(left: int, stretch: int) -> int:
+    """The length of the next slice of a segment of which so much is left.
+
+    With each doubling of the stretch slices are half as long. The last two of a segment are alike; stretched, the last
+    may be twice as long.
+    """
+    most = SLICE_TICKS >> (stretch // ONE).bit_length() - 1
+    if most < SLICE_TICKS:
+        return left if left < 2 * most else most
+    return left if left <= most else min(most, (left + 1) // 2)
+
+
 def stretched_slices(
     motion: HoldableMotion, hold: int | None = None, rest: int | None = None, target: int = ONE
 ) -> list[StretchedSlice]:
     """All slices, when a hold slows down from segment `hold` on and the clock rests in slice `rest`.
 
-    Gentle changes use half of the allowance. Without a hold the stretch goes to `target` from the start. With each
-    doubling of the stretch slices are half as long. The last two of a segment are alike; stretched, the last may be
-    twice as long.
+    Gentle changes use half of the allowance. Without a hold the stretch goes to `target` from the start.
     """
     slices: list[StretchedSlice] = []
     stretch, path = ONE if hold is not None else target, 0
     for k, (segment, (slow, fast, _)) in enumerate(zip(motion.segments, motion.heads, strict=True)):
         left = duration_ticks(segment)
         while left:
-            most = SLICE_TICKS >> (stretch // ONE).bit_length() - 1
-            if most < SLICE_TICKS:
-                length = left if left < 2 * most else most
-            else:
-                length = left if left <= most else min(most, (left + 1) // 2)
+            length = slice_ticks(left, stretch)
             end = stretch
             if hold is not None and k >= hold and (rest is None or len(slices) <= rest):
                 end = slowed(stretch, rate_value(slow) >> 1, length)

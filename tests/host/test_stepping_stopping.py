@@ -12,10 +12,10 @@ from planarm.stepping.check_motion import Planned
 from planarm.stepping.check_stop import check_stop
 from planarm.stepping.schedule import schedule
 from planarm.stepping.slowing import shortfall_ticks
-from planarm.stepping.stopping import LARGEST_RATE_PER_S, allowances, least_of_neighbours, path_time_to_rest
+from planarm.stepping.stopping import LARGEST_RATE_PER_S, Slices, allowances, least_of_neighbours, path_ticks_to_rest
 from planarm.stepping.table import table_of
 from planarm.trajectory.timing import time_path
-from planarm_wire.messages import SLICE_TICKS
+from planarm_wire.messages import SLICE_TICKS, TICKS_HZ
 from planarm_wire.wirings import board_of
 
 SLICE = SLICE_TICKS
@@ -69,7 +69,9 @@ def test_a_stop_from_a_constant_speed_takes_half_of_v_over_a():
 
     def stop_s(segment_s):
         count = int(1.0 / segment_s)
-        return path_time_to_rest(np.full(count, segment_s), np.full(count, a / v), np.full(count, v / start_stop))[0]
+        each = Slices.of([round(segment_s * TICKS_HZ)] * count)
+        ticks = np.arange(0.0, TICKS_HZ, 1000.0)
+        return path_ticks_to_rest(each, np.full(count, a / v), ticks, np.full(len(ticks), v / start_stop))[0] / TICKS_HZ
 
     ideal = v / (2.0 * a) * (1.0 - (start_stop / v) ** 2)
     assert ideal < stop_s(1e-4) < 1.1 * ideal

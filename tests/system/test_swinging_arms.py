@@ -60,7 +60,7 @@ def held(scene, trajectory, segments, train, begin_s, pause_s):
     segment = np.clip(np.searchsorted(starts, times_s, side="right") - 1, 0, len(segments.allowances) - 1)
     slow = np.array([one.slow_per_s for one in segments.allowances])[segment]
     fast = np.array([one.fast_per_s for one in segments.allowances])[segment]
-    over = _over_start_stop(trajectory, scene, times_s)
+    over = _over_start_stop(scene, trajectory.sample(times_s)[1])
     tau, rate, rests_s, phase, path = 0.0, 1.0, pause_s, "runs", [0.0]
     while tau < trajectory.duration_s and len(path) < 400_000:
         k = min(int(1000.0 * tau), len(times_s) - 1)

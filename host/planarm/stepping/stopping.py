@@ -8,9 +8,12 @@ acceleration q'' u^2 + q' du/dt, with q' and q'' as planned, so it keeps its acc
 The motors keep their torque besides, as far as the plan may use it (`planarm.trajectory.stretch`).
 
 The device changes the clock from slice to slice of a segment: with the stretch s = 1 / u, a slice of duration D that
-starts at s0 ends at s1 = s0 + slow D s0^3, at most 2 s0 (docs/protocol.md). Once all motors are below their start-stop
-speeds it stops. `need` follows that rule in slices as long as at the planned pace. The device's become shorter with
-the stretch, by which it slows down sooner; only the last of a segment may be longer than the one here.
+starts at s0 ends at s1 = s0 + slow D s0^3, at most 2 s0 (docs/protocol.md). It stops in the first slice all over which
+all motors are below their start-stop speeds. `need` follows that rule from every slice's start at the planned pace,
+slice by slice as the device cuts them. It is the most from any start in the segment and from its end: the device slows
+down in a slice when what is left behind it does not hold a need. Its rates may be up to a fifteenth larger than those
+here. So it slows down sooner, and in rare cases cuts so that it rests a part of a slice later, which its
+`starving_ticks` cover (docs/decisions/0138).
 """
 
 from collections.abc import Sequence
@@ -84,20 +87,18 @@ def allowances(trajectory: Trajectory, scene: Scene, durations_ticks: Sequence[i
     limits = np.array([joint.max_acceleration_rad_s2 for joint in scene.joints])
     of_segment = slices.segment[np.searchsorted(starts_s[1:-1], t_s, side="right")]
     first = np.searchsorted(of_segment, np.arange(len(durations_ticks)))
+    over = _over_start_stop(scene, speeds)
     by_torque = torque_changes(Load.of(scene, scene.motion.torque_share), q, speeds, accelerations)
     slow, fast = (
         np.minimum.reduceat(np.minimum(_largest_change(speeds, sign * accelerations, limits), torque), first)
         for sign, torque in zip((1.0, -1.0), by_torque, strict=True)
     )
-    needs = path_time_to_rest(
-        slices.durations / TICKS_HZ,
-        ROUNDED_DOWN * least_of_neighbours(slow)[slices.segment],
-        _over_start_stop(trajectory, scene, starts_s[:-1]),
-    )
-    most = np.maximum.reduceat(needs, np.searchsorted(slices.segment, np.arange(len(durations_ticks))))
-    return tuple(
-        Allowance(float(a), float(b), float(need * TICKS_HZ)) for a, b, need in zip(slow, fast, most, strict=True)
-    )
+    rates = ROUNDED_DOWN * least_of_neighbours(slow)
+    needs = np.append(path_ticks_to_rest(slices, rates, TICKS_HZ * t_s, over), 0)
+    own = np.searchsorted(slices.segment, np.arange(len(durations_ticks)))
+    behind = np.append(own[1:], len(slices.starts))
+    most = np.maximum(np.maximum.reduceat(needs[:-1], own), needs[behind])
+    return tuple(Allowance(float(a), float(b), float(need)) for a, b, need in zip(slow, fast, most, strict=True))
 
 
 def stops(
@@ -114,10 +115,11 @@ def stops(
     """
     slices = Slices.of(durations_ticks)
     starts_s = slices.starts / TICKS_HZ
+    t_s = _times(trajectory, np.append(starts_s, (slices.starts[-1] + slices.durations[-1]) / TICKS_HZ))
     slow = np.array([allowance.slow_per_s for allowance in told])
-    rates = share * ROUNDED_DOWN * least_of_neighbours(slow)[slices.segment]
-    over = _over_start_stop(trajectory, scene, starts_s)
-    return starts_s, path_time_to_rest(slices.durations / TICKS_HZ, rates, over)
+    rates = share * ROUNDED_DOWN * least_of_neighbours(slow)
+    over = _over_start_stop(scene, trajectory.sample(t_s)[1])
+    return starts_s, path_ticks_to_rest(slices, rates, TICKS_HZ * t_s, over) / TICKS_HZ
 
 
 def _times(trajectory: Trajectory, starts_s: Floats) -> Floats:
@@ -136,9 +138,9 @@ def _largest_change(speeds: Floats, accelerations: Floats, limits: Floats) -> Fl
     return np.asarray(np.minimum(rates.min(axis=1), LARGEST_RATE_PER_S))
 
 
-def _over_start_stop(trajectory: Trajectory, scene: Scene, t_s: Floats) -> Floats:
-    """Return at each time how many times its start-stop speed the fastest motor, in these terms, has."""
-    rates_hz = np.abs(Transmission.of(scene).rates(trajectory.sample(t_s)[1]))
+def _over_start_stop(scene: Scene, speeds: Floats) -> Floats:
+    """Return how many times its start-stop speed the fastest motor, in these terms, has; speeds have shape (n, m)."""
+    rates_hz = np.abs(Transmission.of(scene).rates(speeds))
     intervals = np.array([start_stop_ticks(axis) for axis in motor_axes(scene.joints, scene.coupling)])
     return np.asarray((rates_hz * intervals / TICKS_HZ).max(axis=1))
 
@@ -150,25 +152,61 @@ def least_of_neighbours(rates: Floats) -> Floats:
     return np.asarray(np.lib.stride_tricks.sliding_window_view(padded, 2 * wide + 1).min(axis=1))
 
 
-@kernel
-def path_time_to_rest(durations_s: Floats, slow_per_s: Floats, over_start_stop: Floats) -> Floats:
+def path_ticks_to_rest(slices: Slices, slow_per_s: Floats, ticks: Floats, over_start_stop: Floats) -> Ticks:
     """Return the path time that a stop takes from the start of each slice, by the device's rule.
 
     Args:
-        durations_s: of the slices.
-        slow_per_s: the slowing that the device may use in each.
-        over_start_stop: how many times its start-stop speed a motor has at each slice's start.
+        slices: at the planned pace.
+        slow_per_s: the slowing that the device may use in each segment.
+        ticks: increasing times, close to each other.
+        over_start_stop: how many times its start-stop speed a motor has at those.
     """
-    count = durations_s.shape[0]
-    needs = np.zeros(count)
-    for k in range(count):
-        stretch = 1.0
-        i = k
-        while i < count and over_start_stop[i] > stretch:
-            stretch = min(LARGEST_GROWTH * stretch, stretch + slow_per_s[i] * durations_s[i] * stretch**3)
-            needs[k] += durations_s[i]
-            i += 1
+    ends = np.append(slices.starts[1:], slices.starts[-1] + slices.durations[-1])
+    last = np.searchsorted(slices.segment, np.arange(len(slow_per_s)), side="right") - 1
+    found: Ticks = walk_to_rest(slices.starts, slices.segment, ends[last], slow_per_s, ticks, over_start_stop)
+    return found
+
+
+@kernel
+def walk_to_rest(
+    starts: Ticks, segment: Ticks, ends: Ticks, slow_per_s: Floats, ticks: Floats, over_start_stop: Floats
+) -> Ticks:
+    """Return as `path_ticks_to_rest`; slices by their starts and segments, segments by their ends."""
+    needs = np.zeros(starts.shape[0], np.int64)
+    near = 0  # the last time looked at that is not behind the slice
+    for k in range(starts.shape[0]):
+        at, i, stretch = starts[k], segment[k], 1.0
+        while near + 1 < ticks.shape[0] and ticks[near + 1] <= at:
+            near += 1
+        place = near
+        while at < ends[-1]:
+            if at == ends[i]:
+                i += 1
+            length = device_slice_ticks(ends[i] - at, stretch)
+            begin, is_calm = place, over_start_stop[place] <= stretch
+            while is_calm and ticks[place] < at + length and place + 1 < ticks.shape[0]:
+                place += 1
+                is_calm = over_start_stop[place] <= stretch
+            if is_calm:
+                break
+            place = begin
+            stretch = min(LARGEST_GROWTH * stretch, stretch + slow_per_s[i] * length / TICKS_HZ * stretch**3)
+            at += length
+            while place + 1 < ticks.shape[0] and ticks[place + 1] <= at:
+                place += 1
+        needs[k] = at - starts[k]
     return needs
+
+
+@kernel
+def device_slice_ticks(left_ticks: int, stretch: float) -> int:
+    """Return the length of the device's next slice of a segment of which so much is left (docs/protocol.md)."""
+    if stretch < LARGEST_GROWTH:
+        return left_ticks if left_ticks <= SLICE_TICKS else min(SLICE_TICKS, (left_ticks + 1) // 2)
+    most, rest = SLICE_TICKS, stretch
+    while rest >= LARGEST_GROWTH and most > 1:
+        most, rest = most // 2, rest / 2.0
+    return left_ticks if left_ticks < 2 * most else most
 
 
 UNSURE_BYTES = MAX_PAYLOAD_BYTES + QUEUE_FRAME_BYTES
