@@ -28,9 +28,11 @@ WHOLE = (
     "test_firmware_outcomes.py",
     "test_firmware_protocol.py",
     "test_firmware_steps.py",
+    "test_firmware_settings.py",
     "test_firmware_stops.py",
     "test_firmware_stretch.py",
     "test_firmware_supervisor.py",
+    "test_firmware_switches.py",
 )
 
 

@@ -1,4 +1,4 @@
-"""Emergency stop, stop input, limit switches, soft limits, homing, power: each with its stated outcome, on the pins."""
+"""Emergency stop, stop input and hold: each ends all edges in its time and has its stated outcome, on the pins."""
 
 from __future__ import annotations
 
@@ -9,7 +9,6 @@ import pytest
 
 from firmware_board import (
     LEAD_TICKS,
-    REST,
     WAKE_TICKS,
     Board,
     Delays,
@@ -20,65 +19,36 @@ from firmware_board import (
     run_of,
     segment_of,
 )
+from firmware_configured import (
+    BYTE_TICKS,
+    MOST_TICKS_AFTER_STOP,
+    RELEASES,
+    STOP_INPUT,
+    WIRING,
+    Switches,
+    configured,
+    moving,
+)
 from planarm_wire.codec import encode
 from planarm_wire.framing import encode_frame
 from planarm_wire.messages import (
-    BAUD,
-    DEBOUNCE_TICKS,
     EMERGENCY_CODE,
     EMERGENCY_REPEATS,
     ENABLE_PIN,
     HOLD_CODE,
-    JOINTS,
-    MIN_HOMING_TICKS,
     MIN_STEP_HIGH_TICKS,
     STEP_PINS,
     Clear,
-    Config,
     Enable,
     Fault,
-    Home,
-    PinMap,
     Query,
-    Result,
     Resume,
     Segments,
-    SetPosition,
-    SoftLimits,
     Start,
     State,
     Status,
 )
 from planarm_wire.rates import rate_code
-
-BYTE_TICKS = 10 * 16_000_000 // BAUD
-MOST_TICKS_AFTER_STOP = 480  # 30 us
-MOST_DEBOUNCE_TICKS = DEBOUNCE_TICKS * 3 // 2 + 8000  # and a pass of the main program
-ACTIVE_HIGH, RELEASES, STOP_INPUT, LIMITS, OPENS = 1, 2, 4, 8, 16
-WIRING = Config(PinMap.OWN, JOINTS, 0, 0, 0, 160_000, 0, (160_000, 160_000))
-
-
-def configured(firmware: Firmware, **changes: int) -> Board:
-    board = Board(firmware)
-    board.hello()
-    status = board.ask(replace(WIRING, **changes))
-    assert status.refusal is Result.OK
-    board.ask(Enable(1))
-    board.run(WAKE_TICKS)
-    return board
-
-
-def moving(board: Board) -> None:
-    """Both joints at 50,000 and 31,000 steps/s for 60 ms."""
-    motion = end_motion(
-        [segment_of(96_000, run_of(299, first=0, interval=320), run_of(180, first=0, interval=520))] * 10
-    )
-    for segment in motion:
-        board.ask(Segments(0, 0, 0, (segment,)))
-    board.send(Start(LEAD_TICKS))
-    board.run(300_000)
-    assert board.rises(0)
-
 
 ALL_PHASES = range(0, 4160, 7)  # every tick of either joint's interval in moving(); after 4,160 both repeat
 
@@ -206,88 +176,6 @@ def test_an_emergency_releases_the_drivers_when_told_to(firmware: Firmware) -> N
     assert levels == [0, 1]
 
 
-def test_active_high_enable_and_inverted_dir(native_firmware: NativeFirmware) -> None:
-    board = configured(native_firmware, options=ACTIVE_HIGH, dir_inverted=0b01)
-    board.edges.clear()
-    status = board.stream(end_motion([segment_of(30_000, run_of(5), run_of(5))]))
-    assert status.ledger.position_usteps == (5, 5)
-    assert [(e.pin, e.level) for e in board.edges if e.pin == "D5"] == [("D5", 1)]
-    assert [e for e in board.edges if e.pin == "D4"] == [], "low is the positive direction of joint 1"
-    assert board.ask(Enable(0)).state is State.IDLE
-    assert [e.level for e in board.edges if e.pin == ENABLE_PIN] == [0]
-
-
-def test_segments_outside_the_soft_limits_are_a_fault_that_says_which(firmware: Firmware) -> None:
-    board = configured(firmware)
-    board.ask(SoftLimits((-100, -5), (100, 5)))
-    assert board.ask(Segments(0, 0, 0, (segment_of(30_000, run_of(9), run_of(5)),))).fault is Fault.NONE
-    assert board.ask(SoftLimits((-9, -9), (9, 9))).refusal is Result.WRONG_STATE, "what is queued kept the others"
-    status = board.ask(Segments(0, 0, 0, (segment_of(30_000, run_of(9), run_of(1)),)))
-    assert (status.state, status.fault, status.detail) == (State.FAULT, Fault.SOFT_LIMIT, 1)
-    assert board.motion_edges() == []
-
-
-@pytest.mark.parametrize("joint", range(JOINTS))
-@pytest.mark.parametrize("sign", [1, -1])
-def test_each_side_of_the_soft_limits_is_kept(firmware: Firmware, joint: int, sign: int) -> None:
-    # The other side is as far away as can be.
-    far = 2**31 - 1
-    sides = [[-far, -far], [far, far]]
-    sides[sign > 0][joint] = sign * 9
-    for steps, fault in ((9, Fault.NONE), (10, Fault.SOFT_LIMIT)):
-        board = configured(firmware)
-        assert board.ask(SoftLimits(tuple(sides[0]), tuple(sides[1]))).refusal is Result.OK
-        moves = [REST, REST]
-        moves[joint] = run_of(steps, positive=sign > 0)
-        status = board.ask(Segments(0, 0, 0, (segment_of(30_000, *moves),)))
-        assert (status.fault, status.detail) == (fault, joint if fault else 0), steps
-
-
-def test_the_position_is_told_at_rest_only(firmware: Firmware) -> None:
-    board = configured(firmware)
-    assert board.ask(SetPosition((-70_000, 12))).ledger.position_usteps == (-70_000, 12)
-    board.ask(Segments(0, 0, 0, (segment_of(30_000, run_of(9)),)))
-    assert board.ask(SetPosition((0, 0))).refusal is Result.WRONG_STATE
-
-
-def test_idle_drivers_are_released(native_firmware: NativeFirmware) -> None:
-    board = configured(native_firmware, idle_ms=100)
-    board.run(16_000 * 50)
-    assert board.ask().state is State.READY
-    board.run(16_000 * 80)
-    assert board.ask().state is State.IDLE
-
-
-def test_the_first_step_waits_until_the_drivers_are_awake(native_firmware: NativeFirmware) -> None:
-    board = Board(native_firmware)
-    board.hello()
-    board.ask(replace(WIRING, wake_ticks=2_000_000))
-    board.ask(Enable(1))
-    energised = board.edges[-1].tick
-    board.ask(Segments(0, 0, 0, (segment_of(30_000, run_of(5), last=True),)))
-    board.ask(Start(LEAD_TICKS))
-    board.run(3_000_000)
-    assert board.rises(0)[0] >= energised + 2_000_000
-
-
-class Switches:
-    """The inputs of either board; by default nothing is hit and the stop circuit is closed."""
-
-    def __init__(self, firmware: Firmware) -> None:
-        self.firmware = firmware
-        self.set()
-
-    def set(self, hit: int = 0, stop_open: bool = False) -> None:
-        if isinstance(self.firmware, NativeFirmware):
-            self.firmware.set_inputs(hit | (0x80 if stop_open else 0))
-            return
-        assert isinstance(self.firmware, EmulatedFirmware)
-        uno = self.firmware.uno
-        uno.pin("A0").drive(1 if stop_open else 0)
-        for joint, pin in enumerate(("A1", "A2")):
-            uno.pin(pin).drive(0 if hit >> joint & 1 else 1)
-
-
 def test_the_stop_input_ends_all_edges(firmware: Firmware) -> None:
     board = Board(firmware)
     switches = Switches(firmware)
@@ -322,178 +210,6 @@ def test_the_stop_input_cuts_no_pulse(emulated_firmware: EmulatedFirmware) -> No
 
     assert_ends_in_every_phase(emulated_firmware, board, stop)
     assert board.ask().fault is Fault.STOP_INPUT
-
-
-def test_a_limit_hit_in_motion_is_a_fault_that_says_which_and_a_bounce_is_none(firmware: Firmware) -> None:
-    board = Board(firmware)
-    switches = Switches(firmware)
-    board.hello()
-    board.ask(replace(WIRING, options=LIMITS))
-    board.ask(Enable(1))
-    board.run(WAKE_TICKS)
-    moving(board)
-    for _ in range(3):
-        switches.set(hit=0b10)
-        board.run(DEBOUNCE_TICKS // 4)
-        switches.set()
-        board.run(DEBOUNCE_TICKS // 4)
-    assert board.ask_now().fault is Fault.NONE
-    switches.set(hit=0b10)
-    board.run(DEBOUNCE_TICKS + 60_000)
-    status = board.ask()
-    assert (status.fault, status.detail, status.inputs & 3) == (Fault.LIMIT_SWITCH, 1, 0b10)
-    assert status.ledger.position_usteps[0] == board.position_at(0, board.now)
-
-
-@pytest.mark.parametrize("half_ticks", [8000, 16_000, 32_000, 60_000, 78_000])
-def test_a_contact_that_chatters_blinds_no_other(firmware: Firmware, half_ticks: int) -> None:
-    board = Board(firmware)
-    switches = Switches(firmware)
-    board.hello()
-    board.ask(replace(WIRING, options=LIMITS))
-    board.ask(Enable(1))
-    board.run(WAKE_TICKS)
-    moving(board)
-    hit_at = board.now + 6 * half_ticks
-    turn = 0
-    while board.now < hit_at + MOST_DEBOUNCE_TICKS:
-        switches.set(hit=(board.now >= hit_at) << 1 | turn % 2)
-        board.run(half_ticks)
-        turn += 1
-    status = board.ask()
-    assert (status.fault, status.detail, status.inputs & 3) == (Fault.LIMIT_SWITCH, 1, 0b10)
-
-
-def test_a_switch_counts_once_it_has_been_hit_for_long_enough(firmware: Firmware) -> None:
-    # At any moment against the board's own rhythm: what is shorter never counts, what is half as long more always.
-    board = Board(firmware)
-    switches = Switches(firmware)
-    board.hello()
-    board.ask(replace(WIRING, options=LIMITS))
-    for phase in range(0, DEBOUNCE_TICKS // 2, 1900):
-        for lasting, counts in ((DEBOUNCE_TICKS - 200, False), (MOST_DEBOUNCE_TICKS, True)):
-            board.run(3 * DEBOUNCE_TICKS + phase)
-            switches.set(hit=0b10)
-            board.run(lasting)
-            switches.set()
-            assert bool(board.ask_now().inputs & 0b10) is counts, (phase, lasting)
-
-
-def test_an_arm_leaves_a_switch_and_is_watched_again(firmware: Firmware) -> None:
-    """As after homing: what is hit when a motion begins counts once it has been open."""
-    board = Board(firmware)
-    switches = Switches(firmware)
-    board.hello()
-    board.ask(replace(WIRING, options=LIMITS))
-    board.ask(Enable(1))
-    switches.set(hit=0b10)
-    board.run(WAKE_TICKS + DEBOUNCE_TICKS)
-    moving(board)
-    board.run(3 * DEBOUNCE_TICKS)
-    assert board.ask_now().state is State.RUNNING
-    switches.set()
-    board.run(DEBOUNCE_TICKS + 60_000)
-    assert board.ask_now().state is State.RUNNING
-    switches.set(hit=0b10)
-    board.run(DEBOUNCE_TICKS + 60_000)
-    status = board.ask()
-    assert (status.fault, status.detail) == (Fault.LIMIT_SWITCH, 1)
-
-
-@pytest.mark.parametrize("begins_on_the_switch", [False, True])
-@pytest.mark.parametrize("bounces", [False, True])
-def test_homing_ends_on_the_step_where_the_switch_closes(
-    firmware: Firmware, begins_on_the_switch: bool, bounces: bool
-) -> None:
-    """The ledger counts on; the switch closes at `closes_at` usteps of joint 2."""
-    closes_at = 5 if begins_on_the_switch else -40
-    board = Board(firmware)
-    switches = Switches(firmware)
-    board.hello()
-    board.ask(replace(WIRING, options=LIMITS))
-    board.ask(Enable(1))
-    switches.set(hit=0b10 if begins_on_the_switch else 0)
-    board.run(WAKE_TICKS)
-    assert board.ask(Home(1, 0, 20_000, 2 * DEBOUNCE_TICKS, 200, 100)).state is State.HOMING
-    rest_ticks = 0
-    for _ in range(20_000):
-        board.run(2000)
-        pressed = board.position_at(1, board.now) <= closes_at
-        rest_ticks = rest_ticks + 2000 if pressed else 0
-        open_again = bounces and 4000 < rest_ticks < 12_000  # for half a millisecond
-        switches.set(hit=0b10 if pressed and not open_again else 0)
-        if board.replies and board.replies[-1][1].state is not State.HOMING:  # type: ignore[union-attr]
-            break
-    status = board.ask()
-    assert (status.state, status.fault) == (State.READY, Fault.NONE)
-    assert status.ledger.position_usteps == (0, closes_at)
-
-
-@pytest.mark.parametrize(
-    ("fast_ticks", "slow_ticks"),
-    [(MIN_HOMING_TICKS - 1, 2 * DEBOUNCE_TICKS), (MIN_HOMING_TICKS, 2 * DEBOUNCE_TICKS - 1)],
-    ids=["its steps cannot be handed over in time", "its touch is too fast for the debouncing"],
-)
-def test_a_homing_that_is_too_fast_is_refused(firmware: Firmware, fast_ticks: int, slow_ticks: int) -> None:
-    board = Board(firmware)
-    board.hello()
-    board.ask(replace(WIRING, options=LIMITS))
-    board.ask(Enable(1))
-    board.run(WAKE_TICKS)
-    assert board.ask(Home(1, 0, fast_ticks, slow_ticks, 200, 100)).refusal is Result.OUT_OF_RANGE
-    board.ask(Clear())
-    board.ask(Enable(1))
-    board.run(WAKE_TICKS)
-    assert board.ask(Home(1, 0, MIN_HOMING_TICKS, 2 * DEBOUNCE_TICKS, 200, 100)).state is State.HOMING
-
-
-@pytest.mark.parametrize("begins_on_the_switch", [False, True])
-def test_a_switch_that_does_not_open_again_is_a_fault(firmware: Firmware, begins_on_the_switch: bool) -> None:
-    # Welded, or with a broken wire: the joint goes back as far as told and not a step farther.
-    board = Board(firmware)
-    switches = Switches(firmware)
-    board.hello()
-    board.ask(replace(WIRING, options=LIMITS))
-    board.ask(Enable(1))
-    switches.set(hit=0b10 if begins_on_the_switch else 0)
-    board.run(WAKE_TICKS)
-    assert board.ask(Home(1, 0, 20_000, 2 * DEBOUNCE_TICKS, 200, 25)).state is State.HOMING
-    board.run(10 * 20_000)
-    switches.set(hit=0b10)
-    board.run(3_000_000 + 27 * 2 * DEBOUNCE_TICKS)
-    status = board.ask()
-    assert (status.state, status.fault, status.detail) == (State.FAULT, Fault.HOMING_FAILED, 1)
-    towards = len(board.rises(1)) - 25
-    assert towards == 0 if begins_on_the_switch else 10 <= towards <= 20
-    assert status.ledger.position_usteps == (0, 25 - towards)
-
-
-def test_a_homing_waits_until_the_drivers_are_awake(firmware: Firmware) -> None:
-    board = Board(firmware)
-    Switches(firmware)
-    board.hello()
-    board.ask(replace(WIRING, options=LIMITS, wake_ticks=2_000_000))
-    board.edges.clear()
-    board.ask(Enable(1))
-    energised = board.edges[-1].tick
-    assert board.ask(Home(0, 1, 20_000, 160_000, 30, 100)).state is State.HOMING
-    board.run(3_000_000)
-    assert 0 <= board.rises(0)[0] - (energised + 2_000_000) < 400_000  # the mark in EEPROM may come first
-
-
-def test_homing_without_a_switch_fails_within_its_distance(firmware: Firmware) -> None:
-    board = Board(firmware)
-    switches = Switches(firmware)
-    board.hello()
-    board.ask(replace(WIRING, options=LIMITS))
-    board.ask(Enable(1))
-    switches.set()
-    board.run(WAKE_TICKS)
-    board.ask(Home(0, 1, 20_000, 160_000, 30, 100))
-    board.run(30 * 20_000 + 200_000)
-    status = board.ask()
-    assert (status.state, status.fault, status.detail) == (State.FAULT, Fault.HOMING_FAILED, 0)
-    assert status.ledger.position_usteps == (30, 0)
 
 
 HALF_ROUND_TICKS = 2**31  # of the 32-bit clock: what is older seems to lie ahead
