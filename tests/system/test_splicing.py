@@ -213,7 +213,8 @@ KINDS = {
 def test_motions_with_a_limit_of_jerk_or_optimised_for_time_go_on_at_speed(kind, sized, capsys, monkeypatch):
     """Random obstacles at random times: no lost step and no contact; the goal, or a reason for the stop.
 
-    What is left at speed makes every step at its certified time, and keeps the jerk across the border.
+    What is left at speed makes every step at its certified time, and keeps the jerk across the border. The small run
+    goes on until there is one: some kinds seldom are.
     """
     scene = KINDS[kind]
     monkeypatch.setattr(motion, "time", CountedTime())  # however busy the computer is, the plan is the same
@@ -221,7 +222,9 @@ def test_motions_with_a_limit_of_jerk_or_optimised_for_time_go_on_at_speed(kind,
     assert first.certificate.ok, first.certificate.explain()
     rng = np.random.default_rng(len(kind))
     verdicts, reached, spliced, stops = [], 0, 0, []
-    for number in range(sized(3, 100)):
+    for number in range(sized(20, 100)):
+        if number >= sized(3, 100) and spliced:
+            break
         share = float(rng.uniform(0.05, 0.4))
         near = tip_at(first, min(1.0, share + float(rng.uniform(0.3, 0.6)))) + rng.normal(0.0, 1.5, 2)
         arrival = Arrival(share * first.trajectory.duration_s, circle(*near, rng.uniform(1.0, 3.0)))
