@@ -3,6 +3,8 @@
 Program counter, cycle and SREG live in locals, flags come out of tables. Whatever is not an instruction's own
 business (events, interrupts, I/O) happens at one place, when the cycle has reached LOOK_AT; an instruction that
 accesses I/O notes the access and pulls LOOK_AT in. Each instruction begins as one of one word and one cycle.
+It is one function, longer than others may be: an interpreter's table, whose entries share those locals. What is
+rare is in `rare`, what is fused in `fusion`.
 Cycles: AVR Instruction Set Manual, column AVRe, 16-bit program counter.
 """
 
