@@ -49,6 +49,9 @@ LARGEST_RATE_PER_S = 1000.0
 ROUNDED_DOWN = 15.0 / 16.0
 """The wire's rates have 16 steps an octave and round down."""
 
+SURELY_CALM = 0.99
+"""Share of the start-stop speed below which the device, which looks at rounded intervals, finds a motor slower."""
+
 LARGEST_GROWTH = 2.0
 """Most by which the device lets the stretch grow in one slice."""
 
@@ -163,7 +166,9 @@ def path_ticks_to_rest(slices: Slices, slow_per_s: Floats, ticks: Floats, over_s
     """
     ends = np.append(slices.starts[1:], slices.starts[-1] + slices.durations[-1])
     last = np.searchsorted(slices.segment, np.arange(len(slow_per_s)), side="right") - 1
-    found: Ticks = walk_to_rest(slices.starts, slices.segment, ends[last], slow_per_s, ticks, over_start_stop)
+    found: Ticks = walk_to_rest(
+        slices.starts, slices.segment, ends[last], slow_per_s, ticks, over_start_stop / SURELY_CALM
+    )
     return found
 
 
