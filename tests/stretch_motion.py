@@ -122,22 +122,20 @@ def _needs(
 
 def slowed(stretch: int, rate: int, path_ticks: int = SEGMENT_TICKS, target: int = MAX_STRETCH) -> int:
     """The largest lawful stretch at the end of a slice: s1 = s0 + rate D s0^3, at most 2 s0, in 2^-16."""
-    square = min(stretch * stretch >> 16, 2**32 - 1)
-    relative = min(rate * path_ticks, 2**32 - 1) * square >> 32
-    end = stretch + (stretch if relative >= ONE else stretch * relative >> 16)
+    end = stretch + (stretch * relative_change(stretch, rate, path_ticks) >> 16)
     return min(end, MAX_STRETCH, target)
 
 
+def relative_change(stretch: int, rate: int, path_ticks: int) -> int:
+    """Rate D s^2, less than 1, in 2^-16."""
+    return min(min(rate * path_ticks, 2**32 - 1) * stretch * stretch >> 48, ONE - 1)
+
+
 def sped_up(stretch: int, rate: int, path_ticks: int = SEGMENT_TICKS, target: int = ONE) -> int:
-    """The least stretch that three turns of Newton's method from above find for s1 + rate D s1^3 = s0, in 2^-16."""
-    end = stretch
-    for _ in range(3):
-        relative = min(min(rate * path_ticks, 2**32 - 1) * min(end * end >> 16, 2**32 - 1) >> 32, ONE)
-        above = (end * relative >> 16) - (stretch - end)
-        if above <= 0:
-            break
-        end -= above // (((ONE + 3 * relative) >> 8) + 1) << 8
-    return max(end, target)
+    """A stretch above the root of s1 + rate D s1^3 = s0: one turn of Newton's method, in 2^-16."""
+    relative = relative_change(stretch, rate, path_ticks)
+    growth, slope = stretch * relative >> 16, ((ONE + 3 * relative) >> 8) + 1
+    return max(stretch - ((growth << 8) // slope if growth < ONE << 8 else growth // slope << 8), target)
 
 
 def mapped(path: float, path_ticks: int, s0: int, s1: int) -> float:

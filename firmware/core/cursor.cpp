@@ -36,14 +36,14 @@ bool Cursor::has_step_in(const Slice& slice) const {
 
 bool Cursor::is_calm(const Slice& slice, uint32_t start_stop_ticks) const {
     if (!has_step_in(slice)) return true;
-    uint32_t least_ticks = at_.high - last_path_ticks_;
-    if (left_.count > 1) {
-        const uint32_t change = multiply_low(left_.add, static_cast<uint16_t>(left_.count - 2));
-        uint32_t interval = least_of(left_.interval, left_.interval + change) >> 8;
-        if (left_.slow == 0) interval >>= 8;
-        least_ticks = least_of(least_ticks, interval);
-    }
-    return multiply_q16(least_ticks, slice.least_stretch()) >= start_stop_ticks;
+    const uint32_t stretch = slice.least_stretch();
+    // As a rule this tells.
+    if (multiply_q16(at_.high - last_path_ticks_, stretch) < start_stop_ticks) return false;
+    if (left_.count < 2) return true;
+    const uint32_t change = multiply_low(left_.add, static_cast<uint16_t>(left_.count - 2));
+    uint32_t interval = least_of(left_.interval, left_.interval + change) >> 8;
+    if (left_.slow == 0) interval >>= 8;
+    return multiply_q16(interval, stretch) >= start_stop_ticks;
 }
 
 void Cursor::step() {
@@ -99,37 +99,41 @@ uint8_t Cursor::go_to_last(const Slice& slice, const Cursor& first) {
     return steps;
 }
 
-// Intervals that bring the run's steps to its last tick, exactly, and grow as those of the path do when they
-// are stretched, or less where one of them would be shorter than the joint can step. False when the step
-// interrupt cannot bridge them.
-bool Cursor::fit(const Slice& slice, uint16_t first_path, Run& run) const {
-    uint16_t first = whole_ticks(run.interval_q16);
-    uint16_t last = whole_ticks(left_.interval - left_.add);
-    const uint16_t last_path = static_cast<uint16_t>(at_.high);
-    // The stretch is that in the middle of an interval.
-    first = slice.stretched(first, static_cast<uint16_t>(first_path + first / 2));
-    last = slice.stretched(last, static_cast<uint16_t>(last_path - last / 2));
-    if (first > MOST_AHEAD_TICKS || last > MOST_AHEAD_TICKS) return false;
+// Saturated beyond what the step interrupt bridges.
+[[gnu::noinline]] uint16_t stretched(uint32_t stretch, uint32_t interval_q16) {
+    const uint32_t ticks = multiply_high(stretch, whole_ticks(interval_q16));
+    return ticks > MOST_AHEAD_TICKS ? 0xFFFF : static_cast<uint16_t>(ticks);
+}
 
-    const uint8_t intervals = static_cast<uint8_t>(run.steps - 1);
-    const uint32_t mean_q16 = hal::divide_q16(last_ticks_ - run.first_ticks, intervals);
-    run.fraction = 0;
-    run.interval_q16 = mean_q16;
-    run.add_q16 = 0;
-    const uint8_t changes = static_cast<uint8_t>(intervals - 1);
-    if (changes == 0) return mean_q16 <= MOST_AHEAD_Q16;
+// Intervals that bring the run's steps to its last tick, exactly, and grow as those of the path do when they
+// are stretched, or less where one of them would be shorter than the joint can step. What they grow by
+// between the stretches at the first step and at the last goes to all of them: from the middle of the first
+// to that of the last it is as much less as they are fewer. False when the step interrupt cannot bridge them.
+bool Cursor::fit(const uint32_t* stretches, Run& run) const {
+    const uint16_t first = stretched(stretches[0], run.interval_q16);
+    const uint16_t last = stretched(stretches[1], left_.interval - left_.add);
+    if (first > MOST_AHEAD_TICKS || last > MOST_AHEAD_TICKS) return false;
     const bool shrinks = last < first;
     uint16_t growth = static_cast<uint16_t>(shrinks ? first - last : last - first);
-    const uint16_t mean = whole_ticks(mean_q16);
+
+    const uint8_t intervals = static_cast<uint8_t>(run.steps - 1);
+    run.fraction = 0;
+    run.interval_q16 = hal::divide_q16(last_ticks_ - run.first_ticks, intervals);
+    const uint16_t mean = whole_ticks(run.interval_q16);
     const uint16_t room =
         mean > wire::MIN_INTERVAL_TICKS ? static_cast<uint16_t>(mean - wire::MIN_INTERVAL_TICKS) : 0;
     // To the half tick: the least interval has nothing to give.
     if (growth > static_cast<uint16_t>(2 * room)) growth = static_cast<uint16_t>(2 * room);
-    const uint32_t add_q16 = hal::divide_q16(growth, changes);
-    const uint32_t half_q16 = multiply_low(add_q16, changes) >> 1;
-    run.add_q16 = shrinks ? 0 - add_q16 : add_q16;
-    run.interval_q16 = shrinks ? mean_q16 + half_q16 : mean_q16 - half_q16;
-    return mean_q16 + half_q16 <= MOST_AHEAD_Q16;
+    run.add_q16 = hal::divide_q16(growth, intervals);
+    const uint32_t half_q16 = multiply_low(run.add_q16, static_cast<uint8_t>(intervals - 1)) >> 1;
+    const uint32_t most_q16 = run.interval_q16 + half_q16;
+    if (shrinks) {
+        run.add_q16 = 0 - run.add_q16;
+        run.interval_q16 = most_q16;
+    } else {
+        run.interval_q16 -= half_q16;
+    }
+    return most_q16 <= MOST_AHEAD_Q16;
 }
 
 bool Cursor::take(const Slice& slice, Run& run) {
@@ -139,15 +143,18 @@ bool Cursor::take(const Slice& slice, Run& run) {
     run.fraction = at_.low;
     run.interval_q16 = left_.interval;
     run.add_q16 = left_.add;
-    run.first_ticks = slice.ticks_at(first_path);
+    uint32_t stretches[2] = {};
+    if (!slice.is_plain()) stretches[0] = slice.stretch_at(first_path);
+    run.first_ticks = slice.ticks_at(first_path, stretches[0]);
     // The step interrupt bridges none of a slow move's intervals.
     run.steps = left_.slow != 0 ? 1 : go_to_last(slice, first);
     const bool near = run.first_ticks - last_ticks_ <= MOST_AHEAD_TICKS;
-    last_ticks_ = slice.ticks_at(static_cast<uint16_t>(at_.high));
+    if (!slice.is_plain()) stretches[1] = slice.stretch_at(static_cast<uint16_t>(at_.high));
+    last_ticks_ = slice.ticks_at(static_cast<uint16_t>(at_.high), stretches[1]);
     if (run.steps != 1) {
         const bool fits = slice.is_plain() ? run.interval_q16 <= MOST_AHEAD_Q16 &&
                                                  left_.interval - left_.add <= MOST_AHEAD_Q16
-                                           : fit(slice, first_path, run);
+                                           : fit(stretches, run);
         if (!fits) {
             *this = first;
             last_ticks_ = run.first_ticks;

@@ -42,7 +42,7 @@ class Cursor {
     // they are.
     uint8_t go_to_last(const path_clock::Slice& slice, const Cursor& first);
     uint8_t guess(uint16_t path_ticks) const;
-    bool fit(const path_clock::Slice& slice, uint16_t first_path, Run& run) const;
+    bool fit(const uint32_t* stretches, Run& run) const;
 
     Fixed48 at_;  // path time of the next step, from the slice's start
     Steps left_;

@@ -13,7 +13,6 @@ using hal::multiply;
 using hal::multiply_high;
 using hal::multiply_low;
 using hal::multiply_q16;
-using hal::multiply_q32;
 using hal::multiply_saturated;
 
 // value += by, in place: a call takes a third of the bytes that the sum takes where it is made.

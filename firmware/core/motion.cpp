@@ -23,9 +23,17 @@ namespace {
 // soon.
 constexpr int32_t PREPARE_AHEAD_TICKS = wire::MIN_LEAD_TICKS;
 
-// A stretched slice that is begun with less time left is late: the main program needs some 40,000 ticks for
-// it.
-constexpr int32_t LATE_TICKS = 44000;
+// How time is kept for slices whose stretch changes, where joints are fast. Such a slice takes the main
+// program up to 48,000 ticks, a pass that looks at the line up to 18,000: not both fit into the time that a
+// slice lasts. Time is short when the last run of such a slice is begun with less than SHORT_TICKS left, and
+// from a new wish until the first one. Then the line waits when the next slice is due within a pass of it; it
+// is looked at all the same when it has not been for UNSEEN_SLICES. And the first slice after a new wish does
+// not begin a change when it is begun later than LATE_TICKS; one that is stretched already is slowed down by
+// all of its rates then, until there is time again.
+constexpr int32_t SHORT_TICKS = 36000;
+constexpr int32_t LATE_TICKS = 51000;
+constexpr int32_t LINE_PASS_TICKS = 18000;
+constexpr uint8_t UNSEEN_SLICES = 3;
 
 // Segments must have come this long before they start: 2.5 ms.
 constexpr int32_t LATEST_ARRIVAL_TICKS = 40000;
@@ -44,13 +52,18 @@ static_assert(wire::STARVING_TICKS % wire::NEED_UNIT_TICKS == 0, "whole units");
 constexpr uint16_t NEEDS_A_LAP = 0x10000 / wire::NEED_UNIT_TICKS;
 static_assert(NEEDS_A_LAP * static_cast<uint32_t>(wire::NEED_UNIT_TICKS) == 0x10000, "whole needs");
 
+// A step that comes soon passes while a rest is tried again; some 150 ticks each.
+constexpr uint8_t FREEZE_TRIES = 20;
+
 constexpr uint8_t MAX_SLICES = 4;
+
+// Newly: by a new wish, and no slice was begun since.
+enum class Time : uint8_t { ENOUGH, SHORT, SHORT_NEWLY };
 
 // Slices handed over and not yet executed, oldest first.
 struct Prepared {
     uint32_t end_ticks;
     bool ends_segment;
-    bool ends_motion;
     bool calm;
 };
 
@@ -63,7 +76,11 @@ class Motion {
     // What the functions of the same names in motion.h tell.
     void reset();
     void start(uint32_t start_ticks);
-    void set_wish(Wish wished) { wish = wished; }
+    void set_wish(Wish wished) {
+        wish = wished;
+        urgent = true;
+        if (slice.is_plain()) time = Time::SHORT_NEWLY;
+    }
     void set_override(uint8_t to_percent);
     uint8_t override_percent() const { return percent; }
     uint8_t rate_percent() const;
@@ -77,6 +94,7 @@ class Motion {
   private:
     bool is_in_segment() const { return filling || left_ticks != 0; }
     bool is_starving(uint8_t margin) const;
+    bool must_line_wait() const;
     void read_next_segment();
     void open_slice(bool late);
     bool fill_slice();
@@ -105,9 +123,11 @@ class Motion {
     bool segment_last;
     uint32_t left_ticks;  // of the segment, in no slice yet
 
-    bool filling;  // a slice
-    bool urgent;   // more is to be handed over before the line is looked at
-    uint8_t turn;  // the joint whose run was handed over last
+    Time time;
+    bool filling;    // a slice
+    uint8_t unseen;  // slices since the line was looked at, but for those behind which a segment is read
+    bool urgent;     // more is to be handed over before the line is looked at
+    uint8_t turn;    // the joint whose run was handed over last
     uint8_t prepared_count;
     uint32_t frozen_ticks;
     uint32_t executed_segments;
@@ -124,6 +144,12 @@ bool Motion::is_starving(uint8_t margin) const {
     if (intake::is_complete() || segment_last || queue::free_bytes() < FULL_BYTES) return false;
     const uint32_t road_ticks = intake::path_ticks() + left_ticks;
     return multiply_high(road_ticks, NEEDS_A_LAP) < static_cast<uint32_t>(need) + margin;
+}
+
+bool Motion::must_line_wait() const {
+    if (unseen >= UNSEEN_SLICES) return false;
+    return time != Time::ENOUGH ||
+           (slice.is_plain() && (wish != Wish::GO || is_starving(2 * STARVING_MARGIN)));
 }
 
 // Apart from serve, whose frame on the stack lies below the deepest calls.
@@ -155,38 +181,46 @@ bool Motion::is_starving(uint8_t margin) const {
 // A slice is half as long with each doubling of the stretch, so that the clock comes to rest, and goes on, as
 // soon as the rates let it. Short ones take the main program as long as others: the last two of a segment are
 // alike, while the clock is stretched the last one may be up to twice as long.
-uint32_t next_slice_ticks(uint32_t left_ticks, const Slice& before) {
-    uint32_t ticks = wire::SLICE_TICKS;
+uint16_t next_slice_ticks(uint32_t left_ticks, const Slice& before) {
+    uint16_t ticks = wire::SLICE_TICKS;
     uint16_t stretch = static_cast<uint16_t>(before.end_stretch() >> 16);
-    if (left_ticks <= ticks && stretch < 2) return left_ticks;
-    if (stretch < 2) return least_of(ticks, (left_ticks + 1) >> 1);
-    while ((stretch >>= 1) != 0) ticks >>= 1;
-    return left_ticks < 2 * ticks ? left_ticks : ticks;
+    uint32_t most = ticks;
+    if (stretch < 2) {
+        if (left_ticks > ticks) left_ticks = (left_ticks + 1) >> 1;
+    } else {
+        do {
+            ticks >>= 1;
+        } while ((stretch >>= 1) != 1);
+        most = static_cast<uint16_t>(2 * ticks - 1);
+    }
+    return left_ticks <= most ? static_cast<uint16_t>(left_ticks) : ticks;
 }
 
-// Late, it is slowed down by all of its rates until there is time again.
+// `late`: LATE_TICKS.
 [[gnu::noinline]] void Motion::open_slice(bool late) {
     path_clock::Way& way = slice.way();
-    const uint16_t ticks = static_cast<uint16_t>(next_slice_ticks(left_ticks, slice));
+    const uint16_t ticks = next_slice_ticks(left_ticks, slice);
     if (ticks != way.path_ticks) {
         for (Cursor& cursor : cursors) cursor.forget_guess();
     }
     way.path_ticks = ticks;
     way.ends_segment = left_ticks == way.path_ticks;
     left_ticks -= way.path_ticks;
-    way.target = override_stretch;
     way.gently = !(late || wish == Wish::REST_QUICKLY || is_starving(STARVING_MARGIN));
-    if (!way.gently || wish == Wish::REST) way.target = path_clock::MAX_STRETCH;
+    uint32_t target = override_stretch;
+    if (!way.gently || wish == Wish::REST) target = path_clock::MAX_STRETCH;
+    if (late && slice.is_plain()) target = slice.end_stretch();
+    way.target = target;
     slice.follow();
     Prepared& entry = hal::by_base(prepared[prepared_count++]);
     entry.end_ticks = slice.end_ticks();
     entry.ends_segment = way.ends_segment;
-    entry.ends_motion = segment_last & way.ends_segment;
     entry.calm = true;
     for (uint8_t joint = 0; joint < wire::JOINTS && entry.calm; ++joint) {
         entry.calm = cursors[joint].is_calm(slice, settings::config.start_stop_ticks[joint]);
     }
     filling = true;
+    if (!way.ends_segment) ++unseen;
 }
 
 // Hands runs over, one of each joint; while the clock is stretched, when one takes long, of one joint in its
@@ -212,8 +246,9 @@ uint32_t next_slice_ticks(uint32_t left_ticks, const Slice& before) {
 
 // A stretched slice takes much longer than a plain one: each pass that does something for it leaves the line
 // to a later one.
-void Motion::prepare() {
+[[gnu::noinline]] void Motion::prepare() {
     const bool stretched = !slice.is_plain();
+    if (!urgent) unseen = 0;
     urgent = false;
     if (!filling) {
         if (left_ticks == 0) {  // as a rule ahead of time
@@ -221,12 +256,22 @@ void Motion::prepare() {
             urgent = stretched && left_ticks != 0;
             if (left_ticks == 0 || urgent) return;
         }
+        if (prepared_count == MAX_SLICES) return;
         const int32_t away_ticks = clock::ticks_until(slice.end_ticks());
-        if (prepared_count == MAX_SLICES || away_ticks > PREPARE_AHEAD_TICKS) return;
-        open_slice(stretched && away_ticks < LATE_TICKS);
-        urgent = !slice.is_plain();  // else there is time for a run, too
+        if (away_ticks > PREPARE_AHEAD_TICKS) {
+            urgent = away_ticks < PREPARE_AHEAD_TICKS + LINE_PASS_TICKS && must_line_wait();
+            return;
+        }
+        // Not late where no more slices than that can be ahead.
+        const bool late = time >= (stretched ? Time::SHORT : Time::SHORT_NEWLY) && away_ticks < LATE_TICKS &&
+                          prepared_count != MAX_SLICES - 1;
+        open_slice(late);
+        time = late ? Time::SHORT : Time::ENOUGH;
     }
     filling = !fill_slice();
+    if (!slice.is_plain()) {
+        time = clock::ticks_until(slice.start_ticks()) < SHORT_TICKS ? Time::SHORT : Time::ENOUGH;
+    }
     urgent = urgent && (filling || stretched);
 }
 
@@ -236,12 +281,12 @@ Progress Motion::retire() {
         // The last steps of joints 3 and 4 may rise some hundred ticks after their own.
         if (prepared_count == 1 && !step_engine::is_idle()) return Progress::GOING;
         if (prepared[0].ends_segment) ++executed_segments;
-        const bool ends_motion = prepared[0].ends_motion;
         --prepared_count;
         for (uint8_t i = 0; i < MAX_SLICES - 1; ++i) prepared[i] = prepared[i + 1];
         if (prepared_count == 0 && !is_in_segment() && queue::is_empty()) {
+            const bool done = segment_last;
             clear();
-            return ends_motion ? Progress::DONE : Progress::UNDERRUN;
+            return done ? Progress::DONE : Progress::UNDERRUN;
         }
     }
     return Progress::GOING;
@@ -286,7 +331,10 @@ bool Motion::may_freeze() const {
 [[gnu::noinline]] Progress Motion::freeze_if_due() {
     const bool starving = wish == Wish::GO && is_starving(STARVING_MARGIN);
     if (wish == Wish::GO && !starving) return Progress::GOING;
-    if (!may_freeze() || !step_engine::freeze(frozen_ticks)) return Progress::GOING;
+    if (!may_freeze()) return Progress::GOING;
+    for (uint8_t tries = FREEZE_TRIES; !step_engine::freeze(frozen_ticks);) {
+        if (--tries == 0) return Progress::GOING;
+    }
     clock::begin_pass_at(frozen_ticks);
     frozen = true;
     starved = starving;
@@ -312,6 +360,7 @@ void Motion::start(uint32_t start_ticks) {
 void Motion::set_override(uint8_t to_percent) {
     percent = to_percent;
     override_stretch = (100 * ONE) / to_percent;
+    if (slice.is_plain()) time = Time::SHORT_NEWLY;
 }
 
 uint8_t Motion::rate_percent() const {

@@ -6,30 +6,26 @@ namespace path_clock {
 namespace {
 
 // The change of a slice that is stretched by `stretch` where it changes most, in relation to that: rate x
-// path x stretch^2, in 2^-16. At most 1: so a quadratic in the number of steps stays a good likeness, and no
-// slice takes much less time than the main program takes for the next one.
+// path x stretch^2, in 2^-16. Less than 1, as the products are saturated: so a quadratic in the number of
+// steps stays a good likeness, and no slice takes much less time than the main program takes for the next
+// one.
 uint32_t relative_change(uint32_t rate_path, uint32_t stretch) {
-    return least_of(multiply_q32(rate_path, multiply_q16(stretch, stretch)), ONE);
+    return multiply_q16(multiply_q16(rate_path, stretch), stretch) >> 16;
 }
 
 uint32_t slowed(uint32_t stretch, uint32_t rate_path) {
     return stretch + multiply_q16(stretch, relative_change(rate_path, stretch));
 }
 
-// The root of s + F D s^3 = s0 by Newton's method from above: it comes down to the root and does not pass it
-// but for a rounding, where it ends. So each turn gives a lawful stretch and three are near enough. One with
-// a smaller change than there is stays above, too.
+// Near the root of s + F D s^3 = s0, by one turn of Newton's method from s0, which comes down to the root and
+// does not pass it: so the stretch is lawful. A turn takes as long as all else of it. What is small is
+// divided with all of its digits: the clock would not come back to its pace by gentle rates.
 uint32_t sped_up(uint32_t stretch, uint32_t rate_path) {
-    uint32_t end = stretch;
-    for (uint8_t turn = 0; turn < 3; ++turn) {
-        const uint32_t relative = relative_change(rate_path, end);
-        const uint32_t growth = multiply_q16(end, relative);
-        const uint32_t gap = stretch - end;
-        if (growth <= gap) break;
-        const uint32_t slope = ((ONE + multiply_low(relative, 3)) >> 8) + 1;
-        end -= ((growth - gap) / slope) << 8;
-    }
-    return end;
+    const uint32_t relative = relative_change(rate_path, stretch);
+    const uint32_t slope = ((ONE + multiply_low(relative, 3)) >> 8) + 1;
+    const uint32_t growth = multiply_q16(stretch, relative);
+    if (growth < ONE << 8) return stretch - (growth << 8) / slope;
+    return stretch - ((growth / slope) << 8);
 }
 
 }  // namespace
@@ -44,14 +40,17 @@ uint32_t rate_value(uint8_t code) {
     return value;
 }
 
-uint32_t stretch_after(uint32_t stretch, const Way& way) {
-    const uint32_t target = way.target;
-    uint32_t rate = rate_value(stretch < target ? way.rates.slow : way.rates.fast);
+// By a rate's code, in 2^-32; saturated.
+[[gnu::noinline]] static uint32_t rate_path(const Way& way, uint8_t code) {
+    uint32_t rate = rate_value(code);
     static_assert(wire::GENTLE_PERCENT == 50, "a half");
     if (way.gently) rate >>= 1;
-    const uint32_t rate_path = multiply_saturated(rate, way.path_ticks);
-    if (stretch < target) return least_of(slowed(stretch, rate_path), target);
-    return most_of(sped_up(stretch, rate_path), target);
+    return multiply_saturated(rate, way.path_ticks);
+}
+
+uint32_t stretch_after(uint32_t stretch, const Way& way) {
+    if (stretch < way.target) return least_of(slowed(stretch, rate_path(way, way.rates.slow)), way.target);
+    return most_of(sped_up(stretch, rate_path(way, way.rates.fast)), way.target);
 }
 
 void Slice::follow() {
@@ -76,14 +75,10 @@ uint32_t Slice::stretch_at(uint16_t path) const {
     return multiply_high(range_, share) + (falls_ ? s1_ : s0_);
 }
 
-uint32_t Slice::ticks_at(uint16_t path) const {
+uint32_t Slice::ticks_at(uint16_t path, uint32_t stretch) const {
     uint32_t ticks = path;
-    if (!plain_) ticks = multiply_high((stretch_at(path) + s0_) >> 1, path);
+    if (!plain_) ticks = multiply_high((stretch + s0_) >> 1, path);
     return ticks + start_ticks_;
-}
-
-uint16_t Slice::stretched(uint16_t ticks, uint16_t path) const {
-    return static_cast<uint16_t>(least_of(multiply_high(stretch_at(path), ticks), 0xFFFF));
 }
 
 }  // namespace path_clock

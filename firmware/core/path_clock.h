@@ -54,18 +54,17 @@ class Slice {
     bool is_plain() const { return plain_; }  // at a stretch of 1
     bool ends_segment() const { return way_.ends_segment; }
     uint16_t path_ticks() const { return way_.path_ticks; }
+    uint32_t start_ticks() const { return start_ticks_; }
     uint32_t end_ticks() const { return end_ticks_; }
     uint32_t end_stretch() const { return s1_; }
     uint32_t least_stretch() const { return least_of(s0_, s1_); }
 
-    // The tick of a path time since the slice's start.
-    uint32_t ticks_at(uint16_t path) const;
-    // A time so short that begins there and lasts as long on the path, saturated.
-    uint16_t stretched(uint16_t ticks, uint16_t path) const;
+    // The stretch at a path time since the slice's start, and its tick; a plain slice needs no stretch for
+    // it.
+    uint32_t stretch_at(uint16_t path) const;
+    uint32_t ticks_at(uint16_t path, uint32_t stretch) const;
 
   private:
-    uint32_t stretch_at(uint16_t path) const;
-
     uint32_t start_ticks_;
     uint32_t end_ticks_;
     uint32_t s0_;

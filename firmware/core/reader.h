@@ -3,6 +3,8 @@
 
 #include <stdint.h>
 
+#include "hal_bytes.h"
+
 namespace planarm {
 
 class Reader {
@@ -10,29 +12,19 @@ class Reader {
     // Begins with a payload, whose bytes go on at `ring` after `ring_end` when it lies in one.
     void begin(const uint8_t* bytes, uint8_t length, const uint8_t* ring = nullptr,
                const uint8_t* ring_end = nullptr) {
-        at_ = bytes;
-        left_ = length;
-        ring_ = ring;
-        ring_end_ = ring_end;
-        ok_ = true;
+        bytes_ = {bytes, length, true, ring, ring_end};
     }
 
-    bool at_end() const { return left_ == 0; }
+    bool at_end() const { return bytes_.left == 0; }
     // False once a field was cut short or too large; every field read from then on is 0.
-    bool ok() const { return ok_; }
+    bool ok() const { return bytes_.ok; }
 
-    uint8_t u8();
-    uint32_t varuint();
+    uint8_t u8() { return hal::next_byte(bytes_); }
+    uint32_t varuint() { return hal::varuint(bytes_); }
     int32_t varint();
 
   private:
-    uint32_t fail();
-
-    const uint8_t* at_;
-    uint8_t left_;
-    bool ok_;
-    const uint8_t* ring_;
-    const uint8_t* ring_end_;
+    hal::Bytes bytes_;
 };
 
 }  // namespace planarm

@@ -69,10 +69,10 @@ MOST_OFF_TICKS = {
 # of joints 3 and 4 (344). Before joint 3's, which comes 93 to 125 after the rise by itself: joint 4's interrupt (105),
 # the lock, and the instructions around it (4); before joint 4's joint 3's interrupt (107, and 2), too.
 MOST_HIGH_TICKS = {
-    "uno_four": (611, 611, 313, 422),
+    "uno_four": (611, 611, 340, 422),
     "uno_slow": (240, 240),
     "cnc_shield": (56, 56),
-    "cnc_shield_four": (56, 56, 313, 422),
+    "cnc_shield_four": (56, 56, 340, 422),
 }
 WATCH_STOP_INPUT, WATCH_SWITCHES = 4, 8  # bits of CONFIG's options
 # Of joints 1 and 2: every step, on in one direction, on and back, going idle.

@@ -1,4 +1,7 @@
-"""The products and quotients that are written in assembler, on the emulated chip: results, kept registers, cycles."""
+"""What is written in assembler of products, quotients and numbers of the wire, on the emulated chip.
+
+Results, kept registers, cycles.
+"""
 
 from __future__ import annotations
 
@@ -15,17 +18,19 @@ from planarm_wire.messages import BAUD
 EDGES = (0, 1, 2, 0xFF, 0x100, 0xFFFF, 1 << 16, 0xFFFFFF, 1 << 24, 2**31 - 1, 2**31, 2**32 - 1, 0xFFFF0000, 0xFF00FF00)
 DIVISORS = (1, 2, 3, 127, 128, 253, 254, 255)
 KEPT = (1, *range(2, 18), 28, 29)  # by a call, avr-gcc's ABI; r1 is 0
-STACK, SUM, BACK = 0x8FF - 16, 0x600, 0x3F00  # the last in words: erased flash, never executed
+STACK, SUM, BYTES, RING = 0x8FF - 16, 0x600, 0x620, 0x640
+BACK = 0x3F00  # in words: erased flash, never executed
 CALL_CYCLES = 4
 ROUNDS = 60
-# With call and return, as firmware/hal/uno/hal_math.h tells them.
+# With call and return, as hal_math.h and hal_bytes.h of firmware/hal/uno tell them.
 CYCLES = {
     "multiply": (51, 51),
     "multiply_low": (59, 59),
     "multiply_high": (60, 60),
     "multiply_saturated": (61, 64),
-    "multiply_q16": (165, 169),
-    "multiply_q32": (165, 169),
+    "multiply_q16": (159, 162),
+    "next_byte": (27, 44),
+    "varuint": (75, 298),
     "add_to": (39, 39),
     "divide_q16": (91, 700),
 }
@@ -100,7 +105,6 @@ def test_a_product_of_48_bits(chip: Chip) -> None:
         ("multiply_high", 2, lambda a, b: a * b >> 16),
         ("multiply_saturated", 2, lambda a, b: min(a * b, 2**32 - 1)),
         ("multiply_q16", 4, lambda a, b: min(a * b >> 16, 2**32 - 1)),
-        ("multiply_q32", 4, lambda a, b: a * b >> 32),
     ],
 )
 def test_products_of_32_bits(chip: Chip, name: str, b_bytes: int, expected: Callable[[int, int], int]) -> None:
@@ -133,3 +137,80 @@ def test_a_quotient(chip: Chip) -> None:
             assert chip.register(22, 4) == (a << 16) // b, (a, b)
     low, high = CYCLES["divide_q16"]
     assert low <= min(chip.cycles) <= max(chip.cycles) <= high
+
+
+class Ring:
+    """Bytes in a ring of 16, and the reader's state: where, how many are left, whether all went well."""
+
+    SIZE = 16
+
+    def __init__(self, chip: Chip, data: bytes, at: int) -> None:
+        self._chip = chip
+        ring = bytearray(chip.chance.randbytes(self.SIZE))
+        for i, byte in enumerate(data):
+            ring[(at + i) % self.SIZE] = byte
+        chip.write(RING, bytes(ring))
+        self.write(at, len(data), ok=True)
+
+    def write(self, at: int, left: int, ok: bool) -> None:
+        ends = RING.to_bytes(2, "little") + (RING + self.SIZE).to_bytes(2, "little")
+        self._chip.write(BYTES, (RING + at).to_bytes(2, "little") + bytes([left, ok]) + ends)
+
+    def state(self) -> tuple[int, int, bool]:
+        told = self._chip.read(BYTES, 4)
+        return int.from_bytes(told[:2], "little") - RING, told[2], bool(told[3])
+
+
+def number_of(data: bytes) -> tuple[int, int] | None:
+    """A varuint by docs/protocol.md: its value and its bytes; None when it is none."""
+    value = 0
+    for i, byte in enumerate(data[:5]):
+        value |= (byte & 0x7F) << 7 * i
+        if byte < 0x80:
+            return (value, i + 1) if value < 2**32 and (byte or i == 0) else None
+    return None
+
+
+def test_bytes_of_a_ring_come_one_by_one_until_none_is_left(chip: Chip) -> None:
+    for at in range(Ring.SIZE):
+        data = chip.chance.randbytes(chip.chance.randint(0, 5))
+        ring = Ring(chip, data, at)
+        for i, byte in enumerate(data):
+            chip.call("next_byte", r24=(BYTES, 2))
+            assert chip.register(24, 1) == byte
+            assert ring.state() == ((at + i + 1) % Ring.SIZE, len(data) - i - 1, True)
+        for _ in range(2):
+            chip.call("next_byte", r24=(BYTES, 2))
+            assert (chip.register(24, 1), ring.state()[1:]) == (0, (0, False))
+    low, high = CYCLES["next_byte"]
+    assert low <= min(chip.cycles) <= max(chip.cycles) <= high
+
+
+def encoded(value: int) -> bytes:
+    data = bytearray()
+    while value >= 0x80:
+        data.append(value & 0x7F | 0x80)
+        value >>= 7
+    return bytes([*data, value])
+
+
+def test_numbers_of_the_wire(chip: Chip) -> None:
+    chance = chip.chance
+    cases = [encoded(a) + chance.randbytes(2) for a, _ in chip.values()]
+    cases += [encoded(a)[:-1] for a in EDGES]  # cut short
+    cases += [encoded(a)[:-1] + bytes([encoded(a)[-1] | 0x80, 0]) for a in EDGES]  # a needless byte
+    cases += [bytes([0xFF] * n + [last]) for n in (4, 5, 6) for last in (0x0F, 0x10, 0x1F, 0x7F, 1, 0)]  # too large
+    cases += [bytes(chance.choice((0x80, 0xFF, 1, 0)) for _ in range(7)) for _ in range(ROUNDS)]
+    for data in cases:
+        at = chance.randrange(Ring.SIZE)
+        ring = Ring(chip, data, at)
+        chip.call("varuint", r24=(BYTES, 2))
+        told = number_of(data)
+        if told is None:
+            assert (chip.register(22, 4), ring.state()[1:]) == (0, (0, False)), data
+        else:
+            value, count = told
+            assert chip.register(22, 4) == value, data
+            assert ring.state() == ((at + count) % Ring.SIZE, len(data) - count, True), data
+    low, high = CYCLES["varuint"]
+    assert low <= min(chip.cycles) <= max(chip.cycles) <= high, (min(chip.cycles), max(chip.cycles))

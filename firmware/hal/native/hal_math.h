@@ -19,16 +19,13 @@ inline uint32_t multiply_low(uint32_t a, uint16_t b) {
 }
 inline uint32_t multiply_high(uint32_t a, uint16_t b) { return multiply(a, b).high; }
 
-// a b; a b / 2^16 and a b / 2^32, rounded down: 2^32 - 1 when it does not fit.
+// a b, and a b / 2^16, rounded down: 2^32 - 1 when it does not fit.
 inline uint32_t saturated(uint64_t value) {
     return value > 0xFFFFFFFF ? 0xFFFFFFFF : static_cast<uint32_t>(value);
 }
 inline uint32_t multiply_saturated(uint32_t a, uint16_t b) { return saturated(static_cast<uint64_t>(a) * b); }
 inline uint32_t multiply_q16(uint32_t a, uint32_t b) {
     return saturated((static_cast<uint64_t>(a) * b) >> 16);
-}
-inline uint32_t multiply_q32(uint32_t a, uint32_t b) {
-    return static_cast<uint32_t>((static_cast<uint64_t>(a) * b) >> 32);
 }
 
 inline uint64_t whole(Fixed48 value) { return (static_cast<uint64_t>(value.high) << 16) | value.low; }

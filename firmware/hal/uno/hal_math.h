@@ -15,11 +15,9 @@ Fixed48 multiply(uint32_t a, uint16_t b);
 uint32_t multiply_low(uint32_t a, uint16_t b);
 uint32_t multiply_high(uint32_t a, uint16_t b);
 
-// a b; a b / 2^16 and a b / 2^32, rounded down: 2^32 - 1 when it does not fit. 61 to 64 cycles, and 165
-// to 169.
+// a b, and a b / 2^16, rounded down: 2^32 - 1 when it does not fit. 61 to 64 cycles, and 159 to 162.
 uint32_t multiply_saturated(uint32_t a, uint16_t b);
 uint32_t multiply_q16(uint32_t a, uint32_t b);
-uint32_t multiply_q32(uint32_t a, uint32_t b);
 
 // sum += term; 39 cycles.
 void add_to(Fixed48& sum, Fixed48 term);

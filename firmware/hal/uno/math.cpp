@@ -49,45 +49,6 @@ __attribute__((naked, noinline)) Fixed48 multiply(uint32_t, uint16_t) {
         )");
 }
 
-// a b / 2^16, as `multiply` returns it: a in r25 to r22, b in r21 to r18. The products with b's halves are
-// added. Its name is for the assembler.
-extern "C" __attribute__((naked, noinline, used)) void planarm_scale() {
-    __asm__ __volatile__(
-        R"(
-        push r20
-        push r21
-        push r22
-        push r23
-        push r24
-        push r25
-        movw r20, r18
-        call %x[multiply]
-        pop  r25
-        pop  r24
-        pop  r23
-        pop  r22
-        pop  r27
-        pop  r26
-        push r18
-        push r19
-        push r20
-        push r21
-        movw r20, r26
-        call %x[multiply]
-        pop  r27
-        pop  r26
-        pop  r25
-        pop  r24
-        add  r22, r24
-        adc  r23, r25
-        adc  r18, r26
-        adc  r19, r27
-        adc  r20, r1
-        adc  r21, r1
-        ret
-        )" ::[multiply] "i"(multiply));
-}
-
 __attribute__((naked, noinline)) uint32_t multiply_low(uint32_t, uint16_t) {
     __asm__ __volatile__(
         R"(
@@ -122,10 +83,40 @@ __attribute__((naked, noinline)) uint32_t multiply_saturated(uint32_t, uint16_t)
         )" ::[multiply] "i"(multiply));
 }
 
+// a in r25 to r22, b in r21 to r18. The products with b's halves are added.
 __attribute__((naked, noinline)) uint32_t multiply_q16(uint32_t, uint32_t) {
     __asm__ __volatile__(
         R"(
-        call planarm_scale
+        push r20
+        push r21
+        push r22
+        push r23
+        push r24
+        push r25
+        movw r20, r18
+        call %x[multiply]
+        pop  r25
+        pop  r24
+        pop  r23
+        pop  r22
+        pop  r27
+        pop  r26
+        push r18
+        push r19
+        push r20
+        push r21
+        movw r20, r26
+        call %x[multiply]
+        pop  r27
+        pop  r26
+        pop  r25
+        pop  r24
+        add  r22, r24
+        adc  r23, r25
+        adc  r18, r26
+        adc  r19, r27
+        adc  r20, r1
+        adc  r21, r1
         or   r20, r21
         brne 1f
         movw r24, r18
@@ -134,17 +125,7 @@ __attribute__((naked, noinline)) uint32_t multiply_q16(uint32_t, uint32_t) {
         ldi  r23, 0xFF
         movw r24, r22
         ret
-        )");
-}
-
-__attribute__((naked, noinline)) uint32_t multiply_q32(uint32_t, uint32_t) {
-    __asm__ __volatile__(
-        R"(
-        call planarm_scale
-        movw r22, r18
-        movw r24, r20
-        ret
-        )");
+        )" ::[multiply] "i"(multiply));
 }
 
 // The sum's address in r25 and r24; the term as `multiply` returns it.

@@ -133,6 +133,25 @@ CASE(a_speeding_up_keeps_to_its_allowance_and_never_turns_into_a_slowing) {
     }
 }
 
+// By the gentlest rates, too: the clock must come back to its pace.
+CASE(a_speeding_up_uses_nearly_all_of_its_allowance) {
+    using planarm::path_clock::ONE;
+    for (int i = 0; i < 20000; ++i) {
+        const uint32_t stretch = ONE + random_below(3 * ONE);
+        const uint16_t path_ticks = static_cast<uint16_t>(1 + random_below(wire::SLICE_TICKS));
+        const uint8_t code = static_cast<uint8_t>(random_below(256));
+        const uint32_t end =
+            planarm::path_clock::stretch_after(stretch, {path_ticks, false, false, ONE, {0, code}});
+        const double s0 = stretch / 65536.0;
+        const double allowed = planarm::path_clock::rate_value(code) / 4294967296.0 * path_ticks;
+        if (allowed * s0 * s0 > 0.2) continue;
+        double lawful = s0;  // the root of s + F D s^3 = s0
+        for (int turn = 0; turn < 100; ++turn) lawful = s0 - allowed * lawful * lawful * lawful;
+        if (lawful < 1) lawful = 1;
+        CHECK(s0 - end / 65536.0 >= 0.95 * (s0 - lawful) - 8 / 65536.0);
+    }
+}
+
 }  // namespace
 
 CASE(crc_has_the_check_value) {
