@@ -41,17 +41,25 @@ STRETCHED_JOINT_TICKS: Final = 8_500
 """What a board needs more for a segment that is stretched, for each joint of its image: with those of 0.5 and 1 ms uno
 keeps up at one every 2.0 ms; uno_four at one every 2.5 ms with two joints moving, 3.4 ms with three, 4.2 ms with four.
 """
-SLOWED_TICKS: Final = 3_100
-SLOWED_JOINT_TICKS: Final = 5_200
+SLOWED_TICKS: Final = 2_300
+SLOWED_JOINT_TICKS: Final = 4800
 """The main program's work on a slice of the path that is slowed down, and on each joint that moves in it: cycles of
-`Motion::open_slice`, of `Cursor::take` (3,900 to 4,300 on average) and of the passes that they come in."""
-READ_SLOWED_TICKS: Final = 1_400
-READ_SLOWED_JOINT_TICKS: Final = 1_200
+`Motion::open_slice`, of `Cursor::take` (3,500 to 4,100 on average) and of the passes that they come in."""
+SLOWED_ANEW_TICKS: Final = 900
+"""More for each such joint where a slice is not as long as the one before: how many steps it has is not known then."""
+READ_SLOWED_TICKS: Final = 1_000
+READ_SLOWED_JOINT_TICKS: Final = 950
 """What a segment's first slice takes more, and for each joint of the board: `Motion::read_next_segment`."""
-LINE_PASS_TICKS: Final = 15_000
-"""What one pass that looks at the line may take; a slowed slice must be ready so long before it begins. Measured on the
-emulator (docs/decisions/0133): two joints at 265 ticks hold in every phase on a line that is full of queries or of
-repeated segments, four at 1,600 in 58 of 60 cases; at 255 and 1,300 they do not."""
+LINE_PASS_TICKS: Final = 4_700
+UNSEEN_SLICES: Final = 3
+"""The longest pass that looks at the line, and of how many slices that are followed by one of the same segment one is
+followed by such a pass, where time is short (firmware/core/motion.cpp)."""
+WAITING_LINE_LOAD: Final = 0.06
+"""Share of the processor that the interrupts of a full line take which is not answered."""
+SLOWED_SPARE_TICKS: Final = 4_000
+"""A slowed slice must be ready so long before it begins. Measured on the emulator (docs/decisions/0137): at the rates
+where this is just so every hold rests, at many moments of a slice, on a line that is silent, full of queries or full of
+repeated segments."""
 LATEST_READ_TICKS: Final = 40_000
 """How long before its start a segment must be there."""
 LEAST_SHARE: Final = 0.05

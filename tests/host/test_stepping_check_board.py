@@ -77,11 +77,14 @@ def test_interrupts_leave_a_fifth_of_every_5_ms(steps, verdict):
 @pytest.mark.parametrize(
     ("interval", "duration", "both", "verdict"),
     [
-        (285, 228_000, True, "green"),
-        (255, 228_000, True, "red"),
-        (225, 228_000, False, "green"),
-        (270, 70_000, True, "red"),  # two slices, each shorter than what it takes
-        (340, 70_000, True, "green"),
+        (225, 228_000, True, "green"),
+        (225, 114_000, True, "red"),  # a segment is read in every second slice
+        (230, 114_000, True, "green"),
+        (270, 115_000, True, "red"),  # three slices, of which two are half as long
+        (290, 115_000, True, "green"),
+        (270, 70_000, True, "red"),  # two, each shorter than what it takes
+        (280, 70_000, True, "green"),
+        (225, 70_000, False, "green"),
     ],
 )
 def test_slices_that_are_slowed_down_must_be_ready_in_time(interval, duration, both, verdict):
@@ -89,6 +92,21 @@ def test_slices_that_are_slowed_down_must_be_ready_in_time(interval, duration, b
     move = Move(2 * (duration // interval) + 1, 0, interval << 8)
     plan = plan_of((400_000, REST, REST), *[(duration, move, move if both else REST)] * 40, (400_000, REST, REST))
     assert verdict_of(checks_of(plan), "in a stop") == verdict
+
+
+def test_time_to_spare_in_a_stop_is_that_where_a_segment_is_fastest():
+    """Segments that speed up from 400 to 225 ticks and slow down again, beside the same number of steps at one rate."""
+
+    def spare_of(*moves):
+        plan = plan_of((400_000, REST, REST), *[(228_000, move, move) for move in moves] * 10, (400_000, REST, REST))
+        return next(check.value for check in checks_of(plan) if "in a stop" in check.name)
+
+    steps = 2 * 228_000 // (400 + 225)
+    add = round((225 - 400) / (steps - 1) * 2**16)
+    up, down = Move(2 * steps + 1, 10, 400 << 8, add), Move(2 * steps + 1, 10, 225 << 8, -add)
+    on_average = Move(2 * steps + 1, 10, 228_000 // (steps + 1) << 8)
+    fastest = Move(2 * 1013 + 1, 0, 225 << 8)
+    assert spare_of(fastest) < spare_of(up, down) < 0.6 * spare_of(on_average)
 
 
 @pytest.mark.parametrize(("segments_hz", "verdict"), [(300, "green"), (840, "amber"), (1500, "red")])

@@ -20,9 +20,13 @@ from planarm_wire.board_budget import (
     READ_SLOWED_TICKS,
     READ_TICKS,
     SLICE_JOINT_TICKS,
+    SLOWED_ANEW_TICKS,
     SLOWED_JOINT_TICKS,
+    SLOWED_SPARE_TICKS,
     SLOWED_TICKS,
     STEP_INTERRUPT_TICKS,
+    UNSEEN_SLICES,
+    WAITING_LINE_LOAD,
     work_ticks,
 )
 from planarm_wire.messages import (
@@ -56,43 +60,68 @@ def check_board(table: SegmentTable, made: StepTrain, link: LinkSpec) -> list[Ch
         return []
     return [
         _check_load(table, made),
-        _check_slowed(table),
+        _check_slowed(table, made),
         _check_peak(table, link),
         *_check_margin(table, link),
         *_check_supply(table, link),
     ]
 
 
-def _check_load(table: SegmentTable, made: StepTrain) -> Check:
-    """Check the share of the processor that interrupts take in every 5 ms, a busy line included."""
+class _Interrupts(NamedTuple):
+    """The step interrupts of a motion, in their order."""
+
+    ticks: Ticks
+    """Shape (steps,)."""
+    until: Ticks
+    """What those before each have taken, and all of them last; shape (steps + 1,)."""
+
+    def within(self, starts: Ticks, window_ticks: int) -> Ticks:
+        """Return what those take that come in a window from each of the ticks on; shape (starts,)."""
+        first, last = (np.searchsorted(self.ticks, at, side="left") for at in (starts, starts + window_ticks))
+        taken: Ticks = self.until[last] - self.until[first]
+        return taken
+
+
+def _interrupts(table: SegmentTable, made: StepTrain) -> _Interrupts:
     each = STEP_INTERRUPT_TICKS[table.board.name]
     every = np.concatenate([steps.ticks for steps in made.steps])
     order = np.argsort(every, kind="stable")
-    ticks = every[order]
     cost = np.repeat(each[: len(made.steps)], [len(steps.ticks) for steps in made.steps])[order]
-    until = np.concatenate([[0], np.cumsum(cost)])
-    within = until[np.searchsorted(ticks, ticks + LOAD_WINDOW_TICKS, side="left")] - until[:-1]
+    return _Interrupts(every[order], np.concatenate([[0], np.cumsum(cost)]))
+
+
+def _check_load(table: SegmentTable, made: StepTrain) -> Check:
+    """Check the share of the processor that interrupts take in every 5 ms, a busy line included."""
+    interrupts = _interrupts(table, made)
+    ticks = interrupts.ticks
+    within = interrupts.within(ticks, LOAD_WINDOW_TICKS)
     load = LINE_LOAD + (int(within.max()) if len(ticks) else 0) / LOAD_WINDOW_TICKS
     where = _time(int(ticks[within.argmax()])) if len(ticks) else ""
     setting = "joints.microsteps or joints.max_speed_deg_s"
     return at_most("interrupt load in any 5 ms", load, MOST_LOAD, "", where, setting, amber=AMBER_LOAD)
 
 
-def _check_slowed(table: SegmentTable) -> Check:
+def _check_slowed(table: SegmentTable, made: StepTrain) -> Check:
     """Check that the board prepares slices in time while it slows down: a hold would end in a missed step otherwise.
 
-    It is asked of all of the path at nearly the planned pace, where least time is left: an override may keep it so.
+    It is asked of all of the path at nearly the planned pace, where least time is left: an override may keep it so. The
+    line waits then, and what steps take is what those take that come while a slice is prepared.
     """
-    moving = (table.counts > 0).sum(axis=1)
     slices = _slices(table)
-    work = SLOWED_TICKS + SLOWED_JOINT_TICKS * moving[slices.segment]
+    segment, count = slices.segment, np.bincount(slices.segment)
+    moving = (table.counts > 0).sum(axis=1)[segment]
+    lengths = np.diff(slices.starts, append=table.starts[-1])
+    anew = np.diff(lengths, prepend=lengths[0]) != 0
+    within_segment = np.diff(segment, append=len(count)) == 0
     # A segment is read while the slice before is made, where there is time.
     reading = READ_SLOWED_TICKS + READ_SLOWED_JOINT_TICKS * table.counts.shape[1]
-    work = work + reading // np.bincount(slices.segment)[slices.segment]
-    ahead_ticks, k = _ahead_of(table, slices, work)
+    work = SLOWED_TICKS + (SLOWED_JOINT_TICKS + SLOWED_ANEW_TICKS * anew) * moving
+    work = work + reading // count[segment] + LINE_PASS_TICKS // UNSEEN_SLICES * within_segment
+    taken = _interrupts(table, made).within(slices.starts - MIN_LEAD_TICKS, MIN_LEAD_TICKS)
+    ahead_ticks, k = _ahead_of(slices, work, WAITING_LINE_LOAD + taken / MIN_LEAD_TICKS)
     where = f"segment {k}, {_time(int(table.starts[k]))}"
     setting = "joints.microsteps or joints.max_speed_deg_s"
-    ahead_s = (ahead_ticks - LINE_PASS_TICKS) / TICKS_HZ
+    ahead_s = (ahead_ticks - SLOWED_SPARE_TICKS) / TICKS_HZ
     return at_least("time to spare in a stop", ahead_s, 0.0, "s", where, setting)
 
 
@@ -197,7 +226,7 @@ def _ahead_of_preparing(table: SegmentTable) -> tuple[float, int]:
     first = np.diff(slices.segment, prepend=-1) != 0
     moved = moving[slices.segment]
     work = np.where(first, READ_TICKS + READ_JOINT_TICKS * moved, SLICE_JOINT_TICKS * moved)
-    return _ahead_of(table, slices, work)
+    return _ahead_of(slices, work, _interrupt_loads(table)[slices.segment])
 
 
 class _Slices(NamedTuple):
@@ -220,13 +249,14 @@ def _slices(table: SegmentTable) -> _Slices:
     return _Slices(np.array(starts, np.int64), np.array(segment, np.int64))
 
 
-def _ahead_of(table: SegmentTable, slices: _Slices, work: Ticks) -> tuple[float, int]:
+def _ahead_of(slices: _Slices, work: Ticks, loads: Floats) -> tuple[float, int]:
     """Return the least time by which slices are ready that take so much work each, and the segment where it is.
 
-    The board prepares a slice MIN_LEAD_TICKS before its start, and no more than PREPARED_SLICES ahead.
+    `loads` is what interrupts leave no time for while each is prepared. The board prepares a slice MIN_LEAD_TICKS
+    before its start, and no more than PREPARED_SLICES ahead.
     """
     starts = slices.starts
-    takes = work / np.maximum(1.0 - _interrupt_loads(table)[slices.segment], LEAST_SHARE)
+    takes = work / np.maximum(1.0 - loads, LEAST_SHARE)
     freed = np.concatenate([np.full(PREPARED_SLICES - 1, starts[0] - MIN_LEAD_TICKS), starts])[: len(starts)]
     begun = np.maximum(starts - MIN_LEAD_TICKS, freed)
     until = np.cumsum(takes)
