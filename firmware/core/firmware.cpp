@@ -21,7 +21,8 @@ namespace firmware {
 
 namespace {
 
-// While a motion runs, what is not its business is looked at in one pass of so many.
+// While a motion runs, what is not its business is looked at in one pass of so many; so are its limit
+// switches, which do not wait as the line does.
 constexpr uint8_t PASSES_A_LOOK = 4;
 
 // Bytes decoded in one pass, so that the motion is looked after often.
@@ -131,7 +132,8 @@ void serve_hold() {
 }
 
 void serve_rest() {
-    if (supervisor::state() == wire::State::RUNNING && ++passes % PASSES_A_LOOK != 0) return;
+    if ((supervisor::state() == wire::State::RUNNING || motion::is_urgent()) && ++passes % PASSES_A_LOOK != 0)
+        return;
     power::serve();
     serve_homing();
     serve_limits();
@@ -172,8 +174,8 @@ void pass() {
     serve_emergency();  // before the motion wonders where its interrupts are
     serve_motion();
     serve_hold();
-    if (motion::is_urgent()) return;
     serve_rest();
+    if (motion::is_urgent()) return;
     hal::journal_serve();
     // An emergency that comes just now is told by the next STATUS: this one has neither fault nor the last
     // steps.

@@ -146,6 +146,8 @@ bool Motion::is_starving(uint8_t margin) const {
     return multiply_high(road_ticks, NEEDS_A_LAP) < static_cast<uint32_t>(need) + margin;
 }
 
+// From the planned pace it waits a slice before the path is too short, too: then the clock is slowed down in
+// time.
 bool Motion::must_line_wait() const {
     if (unseen >= UNSEEN_SLICES) return false;
     return time != Time::ENOUGH ||

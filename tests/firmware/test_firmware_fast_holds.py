@@ -222,7 +222,7 @@ def test_fast_joints_take_an_override_on_a_busy_line(name: str, percent: int) ->
     held.board.run(20_000)
     held.pump(1_200_000)
     held.quiet()
-    status = held.board.ask()
+    status = held.board.ask_now()  # the line waits, too
     assert (status.fault, status.override_percent) == (Fault.NONE, percent)
     assert status.rate_percent <= percent
 

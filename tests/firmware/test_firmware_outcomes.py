@@ -238,7 +238,7 @@ def test_every_rows_outcome(native_firmware: NativeFirmware, state: State, event
 def test_a_limit_switch_is_watched_wherever_joints_move(native_firmware: NativeFirmware, state: State) -> None:
     player = come_to(native_firmware, state)
     native_firmware.set_inputs(0b10)
-    player.board.run(DEBOUNCE_TICKS + 2 * MS_TICKS)
+    player.board.run(DEBOUNCE_TICKS * 3 // 2 + MS_TICKS)
     status = player.board.ask_now()
     assert (status.state, status.fault, status.detail) == (S.FAULT, Fault.LIMIT_SWITCH, 1)
     assert status.ledger.position_usteps[0] != 0
