@@ -132,10 +132,12 @@ void serve_hold() {
 }
 
 void serve_rest() {
-    if ((supervisor::state() == wire::State::RUNNING || motion::is_urgent()) && ++passes % PASSES_A_LOOK != 0)
-        return;
-    power::serve();
-    serve_homing();
+    const bool urgent = motion::is_urgent();
+    if ((supervisor::state() == wire::State::RUNNING || urgent) && ++passes % PASSES_A_LOOK != 0) return;
+    if (!urgent) {
+        power::serve();
+        serve_homing();
+    }
     serve_limits();
     if (supervisor::state() == wire::State::READY && power::is_idle_too_long()) {
         tell(supervisor::Event::RELEASE);
@@ -172,9 +174,9 @@ void pass() {
     hal::watchdog_feed();
     clock::begin_pass();
     serve_emergency();  // before the motion wonders where its interrupts are
+    serve_rest();       // soon after the pass has read the clock: switches are debounced by it
     serve_motion();
     serve_hold();
-    serve_rest();
     if (motion::is_urgent()) return;
     hal::journal_serve();
     // An emergency that comes just now is told by the next STATUS: this one has neither fault nor the last

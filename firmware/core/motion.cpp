@@ -225,16 +225,18 @@ uint16_t next_slice_ticks(uint32_t left_ticks, const Slice& before) {
     if (!way.ends_segment) ++unseen;
 }
 
-// Hands runs over, one of each joint; while the clock is stretched, when one takes long, of one joint in its
-// turn. True when nothing of the slice is left.
+// Hands runs over, of two joints in their turn; while the clock is stretched, when one takes long, of one.
+// True when nothing of the slice is left.
 [[gnu::noinline]] bool Motion::fill_slice() {
     bool more = false;
+    uint8_t runs = slice.is_plain() ? 2 : 1;
     uint8_t joint = turn;
     for (uint8_t i = 0; i < wire::JOINTS; ++i) {
         joint = joint == wire::JOINTS - 1 ? 0 : static_cast<uint8_t>(joint + 1);
         Cursor& cursor = hal::by_base(cursors[joint]);
         if (!cursor.has_step_in(slice)) continue;
-        if ((!urgent || slice.is_plain()) && step_engine::has_room(joint)) {
+        if (runs != 0 && step_engine::has_room(joint)) {
+            --runs;
             step_engine::append(joint, cursor.take(slice, step_engine::next_run(joint)));
             urgent = true;
             turn = joint;

@@ -138,8 +138,8 @@ class Held:
         self.pump(200_000)
         serial.write(bytes([DELIMITER]))
         self.pump(50_000)
-        for _ in range(100):
-            self.firmware.uno.run(cycles=50_000)
+        for _ in range(20):
+            self.firmware.uno.run(cycles=400_000)  # the board may look at its line every fourth slice only
             if not serial.read():
                 break
         self.filling = filling

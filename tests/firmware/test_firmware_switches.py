@@ -66,6 +66,7 @@ def test_a_contact_that_chatters_blinds_no_other(firmware: Firmware, half_ticks:
         switches.set(hit=(board.now >= hit_at) << 1 | turn % 2)
         board.run(half_ticks)
         turn += 1
+    switches.set(hit=0b10)
     status = board.ask()
     assert (status.fault, status.detail, status.inputs & 3) == (Fault.LIMIT_SWITCH, 1, 0b10)
 
