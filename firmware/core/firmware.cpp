@@ -175,8 +175,8 @@ void pass() {
     clock::begin_pass();
     serve_emergency();  // before the motion wonders where its interrupts are
     serve_rest();       // soon after the pass has read the clock: switches are debounced by it
+    serve_hold();       // before the motion, whose part of a pass may be long
     serve_motion();
-    serve_hold();
     if (motion::is_urgent()) return;
     hal::journal_serve();
     // An emergency that comes just now is told by the next STATUS: this one has neither fault nor the last
