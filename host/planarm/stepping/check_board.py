@@ -7,6 +7,7 @@ import numpy as np
 
 from planarm.scene import LinkSpec
 from planarm.stepping.certificate import Check, at_least, at_most
+from planarm.stepping.stopping import Slices
 from planarm.stepping.table import SegmentTable, segment_bytes
 from planarm.stepping.train import Floats, StepTrain, Ticks
 from planarm_wire.board_budget import (
@@ -107,11 +108,10 @@ def _check_slowed(table: SegmentTable, made: StepTrain) -> Check:
     It is asked of all of the path at nearly the planned pace, where least time is left: an override may keep it so. The
     line waits then, and what steps take is what those take that come while a slice is prepared.
     """
-    slices = _slices(table)
+    slices = Slices.of(table.durations.tolist())
     segment, count = slices.segment, np.bincount(slices.segment)
     moving = (table.counts > 0).sum(axis=1)[segment]
-    lengths = np.diff(slices.starts, append=table.starts[-1])
-    anew = np.diff(lengths, prepend=lengths[0]) != 0
+    anew = np.diff(slices.durations, prepend=slices.durations[0]) != 0
     within_segment = np.diff(segment, append=len(count)) == 0
     # A segment is read while the slice before is made, where there is time.
     reading = READ_SLOWED_TICKS + READ_SLOWED_JOINT_TICKS * table.counts.shape[1]
@@ -222,34 +222,14 @@ def _ahead_of_preparing(table: SegmentTable) -> tuple[float, int]:
     by its first slice.
     """
     moving = (table.counts > 0).sum(axis=1)
-    slices = _slices(table)
+    slices = Slices.of(table.durations.tolist())
     first = np.diff(slices.segment, prepend=-1) != 0
     moved = moving[slices.segment]
     work = np.where(first, READ_TICKS + READ_JOINT_TICKS * moved, SLICE_JOINT_TICKS * moved)
     return _ahead_of(slices, work, _interrupt_loads(table)[slices.segment])
 
 
-class _Slices(NamedTuple):
-    """The device's slices; shape (slices,) each."""
-
-    starts: Ticks
-    segment: Ticks
-    """Index of the segment."""
-
-
-def _slices(table: SegmentTable) -> _Slices:
-    """Cut the path as the device does at the planned pace: docs/protocol.md, slice_ticks."""
-    starts, segment = [], []
-    for k, (start, left) in enumerate(zip(table.starts.tolist(), table.durations.tolist(), strict=False)):
-        while left > 0:
-            starts.append(start)
-            segment.append(k)
-            length = left if left <= SLICE_TICKS else min(SLICE_TICKS, (left + 1) // 2)
-            start, left = start + length, left - length  # noqa: PLW2901
-    return _Slices(np.array(starts, np.int64), np.array(segment, np.int64))
-
-
-def _ahead_of(slices: _Slices, work: Ticks, loads: Floats) -> tuple[float, int]:
+def _ahead_of(slices: Slices, work: Ticks, loads: Floats) -> tuple[float, int]:
     """Return the least time by which slices are ready that take so much work each, and the segment where it is.
 
     `loads` is what interrupts leave no time for while each is prepared. The board prepares a slice MIN_LEAD_TICKS
